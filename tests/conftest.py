@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -75,10 +76,16 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         pytest.skip(f"slow, and {minutes:g} minutes are over; run with --slow alone")
 
 
-def pytest_collection_finish(session: pytest.Session) -> None:
-    """Eleven thousand tests stay until the end: the collector need not look through them again."""
-    gc.collect()
-    gc.freeze()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Hardly anything of it is garbage, and all stays until the end: nobody looks through it."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -9,7 +9,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.messages_panel import draw_note
-from shapeshift.app.editor.panels.panel import Section, draw_sections
+from shapeshift.app.editor.panels.panel import Section, draw_sections, in_order
 from shapeshift.app.editor.panels.scale_bar import has_scale
 from shapeshift.app.editor.panels.sections.objects_panel import draw_object_list
 from shapeshift.app.editor.panels.sections.parts_panel import draw_parts
@@ -227,7 +227,7 @@ class WristMenu:
         draw_head(self._state.editor, UI_SCALE)
         foot = imgui.get_frame_height() + style.item_spacing.y
         imgui.begin_child("sections", Vec(0, -foot))
-        draw_sections(self._sections, UI_SCALE)
+        draw_sections(in_order(self._sections), UI_SCALE)
         imgui.end_child()
         self._foot.draw(self._seconds)
         imgui.end()

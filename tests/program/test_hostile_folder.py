@@ -99,10 +99,14 @@ def test_commands_take_nothing_from_the_current_folder(folder, capture, tmp_path
     run(folder, tmp_path, words)
 
 
-def test_linkers_of_opencl_drivers_take_nothing_either(folder, tmp_path):
+def test_linkers_of_opencl_drivers_take_nothing_and_settings_that_are_paths_begin_there(
+    folder, tmp_path
+):
     """Kernels that no cache has: PoCL calls ld, which looks for libgcc_s.so.1 where it runs."""
+    (folder / "linked").mkdir()
     pictures = ("render", "a.ply", "--out", "light/linked", *SIZE)
-    run(folder, tmp_path, pictures, POCL_CACHE_DIR=str(tmp_path / "pocl"))
+    run(folder, tmp_path, pictures, POCL_CACHE_DIR="linked/kernels", TMPDIR="linked")
+    assert any((folder / "linked" / "kernels").iterdir())
 
 
 HEAVY = [
@@ -194,13 +198,6 @@ def test_relative_paths_begin_where_the_program_was_started(folder, capture, tmp
     assert list((tmp_path / "here" / "pictures").glob("*.png"))
     paths("compare", "./a.ply@0", "../here/b.ply@1", *SIZE, "--out", "sheets")
     assert (tmp_path / "here" / "sheets").is_dir()
-
-
-def test_settings_that_are_paths_begin_there_too(folder, tmp_path):
-    (tmp_path / "here").mkdir()
-    run(tmp_path / "here", tmp_path, ("render", folder / "a.ply", "--out", "a", *SIZE),
-        POCL_CACHE_DIR="kernels", TMPDIR="..")  # fmt: skip
-    assert any((tmp_path / "here" / "kernels").iterdir())
 
 
 @pytest.mark.skipif(not first_start.is_ready(True), reason="not started through launch.py test")

@@ -44,15 +44,15 @@ def settle(viewer: Viewer) -> None:
 def lay_marks(viewer: Viewer, hands: RealHands) -> None:
     """Three spots, a box and a line, in logical pixels of the window."""
     hands.key("y")
-    for place in ((715, 262), (700, 385), (900, 300)):
+    for place in ((734, 262), (700, 385), (911, 300)):
         hands.click(*place)
-    hands.drag((600, 260), (690, 340))
+    hands.drag((624, 260), (710, 338))
     hands.hold_key("Shift_L", True)
-    hands.drag((600, 425), (960, 425))
+    hands.drag((624, 423), (968, 423))
     hands.hold_key("Shift_L", False)
     settle(viewer)
     viewer.inspecting.bound("above", ABOVE_C)
-    hands.move(1080, 440)
+    hands.move(1050, 440)
 
 
 def lay_lengths(viewer: Viewer, hands: RealHands) -> None:
@@ -60,10 +60,10 @@ def lay_lengths(viewer: Viewer, hands: RealHands) -> None:
     hands.key("y", "Shift_L")
     ruler = viewer.ruler
     for kind, places in (
-        ("distance", ((452, 238), (577, 236))),
-        ("area", ((350, 465), (458, 405), (700, 405), (640, 470), (350, 465))),
-        ("angle", ((800, 330), (800, 395), (866, 388))),
-        ("distance", ((815, 182), (905, 437))),
+        ("distance", ((483, 238), (608, 236))),
+        ("area", ((381, 465), (489, 405), (731, 405), (671, 470), (381, 465))),
+        ("angle", ((815, 330), (815, 393), (878, 386))),
+        ("distance", ((829, 185), (915, 434))),
     ):
         ruler.choose_kind(kind)
         run_frames(viewer, 1)
@@ -82,8 +82,8 @@ def main() -> None:
         tempfile.TemporaryDirectory() as pictures,
     ):
         for name, stop, sections, act in (
-            ("inspect.png", "Thermal", ("Stops", "Look", "Camera"), lay_marks),
-            ("measure.png", "RGB", ("Look", "Inspect", "Camera"), lay_lengths),
+            ("inspect.png", "Thermal", ("Look",), lay_marks),
+            ("measure.png", "RGB", (), lay_lengths),
         ):
             viewer = viewer_on(window, renderer, read(DEMO), Path(pictures), stop)
             viewer.shell.actions.sections.update(dict.fromkeys(sections, False))

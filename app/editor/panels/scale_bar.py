@@ -57,11 +57,13 @@ def draw_scale_bar(
         corners = Vec(start - reach, y - reach), Vec(start - reach, y + reach), Vec(start + 2, y)
         draw.add_triangle_filled(*corners, theme.color(theme.ACCENT, weight))
         draw.add_line(Vec(start, y), Vec(bar, y), theme.color(theme.ACCENT, weight), 2 * ui_scale)
-    values = nice_ticks(low, high)
+    values, above = nice_ticks(low, high), bottom + line  # where the text below the next one is
     for value, text in zip(values, tick_text(values), strict=True):
         y = last - (last - first) * (value - low) / (high - low if high > low else 1.0)
         draw.add_line(Vec(bar, y), Vec(bar + 5 * ui_scale, y), ink, max(1.0, ui_scale))
-        draw.add_text(Vec(bar + 10 * ui_scale, y - line / 2), ink, text)
+        if above - y >= 0.95 * line:  # a low bar has not room for all of them
+            draw.add_text(Vec(bar + 10 * ui_scale, y - line / 2), ink, text)
+            above = y
     draw.pop_clip_rect()
 
 

@@ -97,10 +97,3 @@ class ObjectEdits:
         self.state.say(words.format(what=said_deed(what)) if what else nothing)
         if len(self.state.scene.objects) != count:
             self.count_changed()
-
-    def look_from_here(self) -> None:
-        """The view of now, about the point that it turns around, is where the scene opens."""
-        if self._viewpoint is None:
-            return
-        if self.edit(edits.look_from, self._viewpoint.stated(), what="first look"):
-            self.state.say(said("The scene opens with this view, once it is saved."))

@@ -78,9 +78,11 @@ def font_for(code: str) -> Path | None:
     return next((p for p in font_files(font_folders()) if has_letters(p, letters)), None)
 
 
-def more_letters() -> Path | None:
-    """The font that the language in use needs besides our own; None: none."""
-    return font_for(language_in_use().code) if missing_letters(language_in_use()) else None
+def more_letters(every: bool = False) -> list[Path]:
+    """Fonts besides our own that the language in use needs, or `every` language that is offered."""
+    languages = all_languages().values() if every else (language_in_use(),)
+    found = [font_for(each.code) for each in languages if missing_letters(each)]
+    return [path for path in dict.fromkeys(found) if path is not None]
 
 
 def is_offered(code: str) -> bool:

@@ -47,7 +47,7 @@ def said_deed(what: str) -> str:
 # Texts of the overlay in the language that is in use.
 #
 # The code says them in English; a table has what stands for each in another language. A file
-# CODE.json beside this one is all that another language needs: {"name", "texts": {English:
+# CODE.json beside this one is all that another language needs: {"name", "own", "texts": {English:
 # other}}.
 
 ENGLISH = "en"
@@ -60,11 +60,13 @@ class Language:
     code: str  # ISO 639-1
     name: str  # as people who speak it read it with the letters of any font
     texts: dict[str, str] = field(default_factory=dict)
+    own: str = ""  # its name in its own letters; "": `name` is that
 
     @property
     def letters(self) -> list[int]:
         """Code points of all letters in its texts, ascending."""
-        return sorted({ord(letter) for text in self.texts.values() for letter in text})
+        texts = (*self.texts.values(), self.own)
+        return sorted({ord(letter) for text in texts for letter in text})
 
 
 @cache
@@ -73,7 +75,7 @@ def all_languages() -> dict[str, Language]:
     found = {ENGLISH: Language(ENGLISH, "English")}
     for path in sorted(Path(__file__).parent.glob("*.json")):
         table = json.loads(path.read_text(encoding="utf-8"))
-        found[path.stem] = Language(path.stem, table["name"], table["texts"])
+        found[path.stem] = Language(path.stem, table["name"], table["texts"], table.get("own", ""))
     return found
 
 

@@ -31,6 +31,8 @@ class Hooks:
     over: list[Callable[[FrameRequest], None]] = field(default_factory=list)
     # beside: asked with the scene and the window's width for what is right of a line instead
     beside: Callable[[Scene, int], RightSide | None] = lambda scene, width: None
+    # film: whether its timeline lies over the whole lower edge
+    film: Callable[[], bool] = lambda: False
     # marks: called with ui_scale; over the picture, under the panel, not in saved pictures
     marks: list[Callable[[float], None]] = field(default_factory=list)
     # closing: asked when the window is to be closed; False = not yet

@@ -69,7 +69,7 @@ def attach_parts(
                 tool, scale, mouse.how, viewpoint.view().world_from_eye.position
             ),
             opens=mouse.opens,
-            early=lambda: tool.on,
+            in_hand=lambda: tool.on,
         )
     )
     hooks.keys["Parts"] = list(KEYS)

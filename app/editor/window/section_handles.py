@@ -51,7 +51,7 @@ def attach_sections(
             "Sections",
             lambda scale: draw_cuts(tool, state, scale),
             opens=handles.opens,
-            early=lambda: tool.on,
+            in_hand=lambda: tool.on,
         )
     )
     hooks.keys["Sections"] = list(KEYS)

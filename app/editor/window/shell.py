@@ -7,7 +7,7 @@ import glfw
 from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels.messages_panel import draw_messages
-from shapeshift.app.editor.panels.panel import PanelActions
+from shapeshift.app.editor.panels.panel import PanelActions, chosen_tool
 from shapeshift.app.editor.panels.scale_bar import KELVIN
 from shapeshift.app.editor.panels.widgets import theme
 from shapeshift.app.editor.panels.widgets.panel_rows import choice, item_label, tip
@@ -30,6 +30,7 @@ KEY_WORDS = {
 }  # fmt: skip
 WORDS = re.compile(rf"\b({'|'.join(KEY_WORDS)})\b")
 COLUMN = 330.0  # logical pixels, of a group
+LONGEST_SEARCH = 60  # letters
 KEY_PART = 0.40  # of a column, where what a key does begins
 MOUSE_AND_CAMERA = (
     ("drag", "orbit; look about when flying"),
@@ -79,14 +80,38 @@ GROUPS = {
 }
 
 
-def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
-    """The sheet over the window's middle; `more` are groups of other parts of the program.
+def found_groups(
+    groups: Mapping[str, Sequence[Row]], first: Sequence[str], words: str
+) -> dict[str, list[Row]]:
+    """Those of the tool in hand `first`; of all the rows that have these words, in the language in
+    use: all of a group whose heading has them.
+    """
+    wanted = words.casefold().split()
 
-    Returns where it is, and whether it was closed by its button.
+    def has(*texts: str) -> bool:
+        whole = " ".join(texts).casefold()
+        return all(word in whole for word in wanted)
+
+    order = [name for name in first if name in groups]
+    order += [name for name in groups if name not in order]
+    found = {
+        name: [row for row in groups[name] if has(said(name), key_text(row[0]), said(row[1]))]
+        for name in order
+    }
+    return {name: rows for name, rows in found.items() if rows}
+
+
+def draw_keys(
+    more: dict[str, list[Row]], first: Sequence[str], words: str, ui_scale: float
+) -> tuple[Box, bool, str]:
+    """The sheet over the window's middle; `more` are groups of other parts of the program, `first`
+    those of the tool in hand, `words` what is looked for.
+
+    Returns where it is, whether it was closed, and what is looked for now.
     """
     screen = imgui.get_io().display_size
     groups = {**{name: list(rows) for name, rows in GROUPS.items()}, **more}
-    columns = max(1, min(3, int(0.94 * screen.x / (COLUMN * ui_scale)), len(groups)))
+    columns = max(1, min(3, int(0.94 * screen.x / (COLUMN * ui_scale))))
     width = min(columns * COLUMN * ui_scale, 0.94 * screen.x)
     imgui.set_next_window_pos(Vec(screen.x / 2, screen.y / 2), 0, Vec(0.5, 0.5))
     imgui.set_next_window_size_constraints(Vec(width, 0), Vec(width, 0.94 * screen.y))
@@ -99,7 +124,10 @@ def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
         | flags.always_auto_resize,
     )  # fmt: skip
     imgui.pop_style_color()
-    closed = _heading(ui_scale)
+    closed, words = _heading(words, ui_scale)
+    groups = found_groups(groups, first, words)
+    if not groups:
+        imgui.text_disabled(said("No key has these words."))
     start, each = imgui.get_cursor_pos(), imgui.get_content_region_avail().x / columns
     lowest = start.y
     for column, names in enumerate(spread(groups, columns)):
@@ -111,19 +139,28 @@ def draw_keys(more: dict[str, list[Row]], ui_scale: float) -> tuple[Box, bool]:
     imgui.dummy(Vec(0, 0))  # the window reaches down to here
     box = theme.window_box()
     imgui.end()
-    return box, closed
+    return box, closed, words
 
 
-def _heading(ui_scale: float) -> bool:
-    """What this is, and the button that closes it, at the right; True when it was clicked."""
+def _heading(words: str, ui_scale: float) -> tuple[bool, str]:
+    """What is looked for, and the button that closes the sheet, at the right; whether it is to
+    close.
+    """
     start, room = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
-    imgui.text_unformatted(said("Keys and mouse"))
-    below, width = imgui.get_cursor_pos(), 80 * ui_scale
+    width = 80 * ui_scale
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    imgui.set_next_item_width(min(room - width - 16 * ui_scale, 1.2 * COLUMN * ui_scale))
+    hint = said("Keys and mouse: type to find one")
+    _, words = imgui.input_text_with_hint("##find", hint, words[:LONGEST_SEARCH])
+    left = imgui.is_item_focused() and imgui.is_key_pressed(imgui.Key.escape, False)
+    tip("Words of what you want to do, or a key.", ui_scale)
+    below = imgui.get_cursor_pos()
     imgui.set_cursor_pos(Vec(start.x + room - width, start.y))
     closed = imgui.button(item_label("Close"), Vec(width, 0))
     tip("F1 or Esc.", ui_scale)
-    imgui.set_cursor_pos(Vec(below.x, below.y + 10 * ui_scale))
-    return closed
+    imgui.set_cursor_pos(Vec(below.x, below.y + 8 * ui_scale))
+    return closed or left, words
 
 
 def _group(name: str, rows: Sequence[Row], width: float, ui_scale: float) -> None:
@@ -171,6 +208,7 @@ def spread(groups: Mapping[str, Sequence[Row]], columns: int) -> list[list[str]]
     return out
 
 
+LANGUAGES_WIDE = 240.0  # logical pixels, of what is said under the list
 LARGER, SMALLER, AS_AT_FIRST = ("+", "="), ("-",), ("0",)  # with Ctrl
 
 
@@ -185,10 +223,11 @@ class Shell:
         now: Callable[[], float],
     ) -> None:
         self._window, self._settings, self._messages, self._now = window, settings, messages, now
-        self.keys_open = False
+        self.keys_open, self._words = False, ""  # the sheet of keys, and what is looked for in it
         self.actions = PanelActions(
-            self.fold, self.resize_text, self.show_keys, settings.sections, self.keep
-        )
+            self.fold, self.resize_text, self.show_keys, settings.sections, self.keep,
+            lambda: settings.tool, self.choose_tool, self.draw_languages, set(),
+        )  # fmt: skip
 
     def handle_event(self, event: Event) -> bool:
         """True for a key that is the shell's."""
@@ -220,9 +259,22 @@ class Shell:
         self._messages.say(now, self._now())
         self.keep()
 
+    def choose_tool(self, name: str) -> None:
+        """Another tool of the bar; kept for the next start."""
+        if name != self._settings.tool:
+            self._settings.tool = name
+            self.keep()
+
     def draw_settings(self, ui_scale: float) -> None:
         """What the section Settings has."""
-        draw_settings(self._settings, self.speak, self.keep, ui_scale)
+        draw_settings(self._settings, self.keep, ui_scale)
+
+    def draw_languages(self, ui_scale: float) -> None:
+        """The list under the globe."""
+        if not self._window.every_letter:
+            self._window.restyle(every_letter=True)
+        if (code := draw_languages(ui_scale)) != language_in_use().code:
+            self.speak(code)
 
     def speak(self, code: str) -> None:
         """Texts of another language from the next frame on; kept for the next start."""
@@ -254,9 +306,12 @@ class Shell:
         """Messages in what is free, the sheet of keys over all; returns what takes clicks."""
         boxes = draw_messages(self._messages, free, ui_scale)
         if self.keys_open:
-            box, closed = draw_keys(more_keys, ui_scale)
+            first = chosen_tool(self._settings.tool).keys
+            box, closed, self._words = draw_keys(more_keys, first, self._words, ui_scale)
             boxes.append(box)
             self.keys_open = not closed
+        else:
+            self._words = ""
         return boxes
 
 
@@ -269,28 +324,29 @@ def speak_first(settings: ProgramSettings, messages: Messages) -> None:
     use_language(language.code if language is not None else "")
 
 
-# The panel's section "Settings": language and units, which the next start keeps.
+# The languages under the globe, and the panel's section "Settings": units, which the next start
+# keeps.
 
 
-def draw_settings(
-    settings: ProgramSettings, speak: Callable[[str], None], keep: Callable[[], None],
-    ui_scale: float,
-) -> None:  # fmt: skip
-    """`speak` shows another language, by its code; `keep` writes the settings."""
-    imgui.push_item_width(-1)
-    languages = all_languages()
+def draw_languages(ui_scale: float) -> str:
+    """Each language as its speakers write it, where a font has its letters; the chosen code."""
+    languages, now = all_languages(), language_in_use().code
     offered = [code for code in languages if is_offered(code)]
-    now = language_in_use().code
-    names = [languages[code].name for code in offered]
-    chosen = choice("language", now, offered, names, names=True)
-    tip("The language of this panel. A file of texts is all that another one needs.", ui_scale)
-    if chosen != now:
-        speak(chosen)
-    missing = [language for code, language in languages.items() if code not in offered]
-    imgui.push_text_wrap_pos(0)
-    for language in missing:
-        imgui.text_disabled(why_not(language))
+    for code in offered:
+        language = languages[code]
+        if imgui.selectable(f"{language.own or language.name}###{code}", code == now)[0]:
+            now = code
+        tip("The language of this window. A file of texts is all that another one needs.", ui_scale)
+    imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + LANGUAGES_WIDE * ui_scale)
+    for code in languages.keys() - offered:
+        imgui.text_disabled(why_not(languages[code]))
     imgui.pop_text_wrap_pos()
+    return now
+
+
+def draw_settings(settings: ProgramSettings, keep: Callable[[], None], ui_scale: float) -> None:
+    """`keep` writes the settings."""
+    imgui.push_item_width(-1)
     units = ["", *KELVIN]
     labels = [said("temperature: as filed"), *(said("temperature: {unit}", unit=u) for u in KELVIN)]
     known = settings.temperature if settings.temperature in units else ""

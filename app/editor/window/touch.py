@@ -80,6 +80,7 @@ def attach_touch(
             "Touch",
             lambda ui_scale: draw_touch(touch, ui_scale),
             opens=touch.opens,
+            waits=True,
             shown=lambda: touch.world is not None,
         )
     )

@@ -10,7 +10,11 @@ from shapeshift.app.editor.panels.legend_panel import draw_legend
 from shapeshift.app.editor.panels.outlines import draw_brush, draw_doubts, draw_outlines, draw_ups
 from shapeshift.app.editor.panels.panel import Section, draw_panel
 from shapeshift.app.editor.panels.scale_bar import draw_scale_bar
-from shapeshift.app.editor.panels.sections.camera_panel import draw_cameras, draw_edges
+from shapeshift.app.editor.panels.sections.camera_panel import (
+    draw_cameras,
+    draw_edges,
+    draw_kept_views,
+)
 from shapeshift.app.editor.panels.sections.export_panel import draw_export
 from shapeshift.app.editor.panels.sections.objects_panel import draw_objects
 from shapeshift.app.editor.panels.sections.plain_sections import plain_sections
@@ -64,9 +68,8 @@ LONGEST_STEP_S = 0.25  # of time that passes at once, after a frame that took lo
 
 
 class Viewer:
-    """One window, one renderer, one state, one viewpoint, and the loop that ties them.
-
-    Makes the parts; each is handed the state that it reads and what it may call.
+    """One window, one renderer, one state, one viewpoint, and the loop that ties them; makes the
+    parts, each of which is handed the state that it reads and what it may call.
     """
 
     def __init__(
@@ -96,7 +99,7 @@ class Viewer:
         self.files = self._attach_files()
         self.objects = self._attach_objects(folders, own_files or OwnFiles())
         self._attach_cameras_and_export(folders)
-        more = (self.hooks, folders, self.open_soon)
+        more = (self.hooks, folders, self.open_soon, self.shell.actions)
         self.films = attach_films(window, state, self.viewpoint, *more)
         self.touch = attach_touch(window, state, self.viewpoint, self.hands, self.hooks, options)
         self.parts = attach_parts(window, state, self.viewpoint, self.hooks, self.objects)
@@ -127,8 +130,6 @@ class Viewer:
         self.is_drawn = False  # what the next frame shows, before it began
         self._told: tuple = ()  # what is said and asked, as it was drawn last
         self.frames, self._overlay_ms = 0, 0.0  # drawn since the window opened, of the last one
-
-    # ---- the parts
 
     def _attach_files(self) -> Files:
         hooks, state = self.hooks, self.state
@@ -170,7 +171,6 @@ class Viewer:
                 "Objects",
                 lambda scale: draw_objects(edits, saving, adding.ask, scale),
                 opens=objects.opens,
-                early=lambda: len(state.scene.objects) > 1,
             )
         )
         hooks.keys["Objects"] = list(OBJECT_KEYS)
@@ -178,18 +178,17 @@ class Viewer:
 
     def _attach_cameras_and_export(self, folders: WorkFolders) -> None:
         hooks, state, viewpoint = self.hooks, self.state, self.viewpoint
-        hooks.sections.append(
-            Section("Camera", lambda scale: draw_cameras(state, viewpoint, scale), open_first=True)
-        )
         hooks.status.append(lambda: viewpoint.steps.text)
         hooks.marks.append(lambda scale: draw_edges(state, viewpoint, scale))
         exporting = self.exporting = Exporting(state, viewpoint, folders.exports)
-        hooks.sections.append(Section("Export", lambda scale: draw_export(exporting, state, scale)))
+        hooks.sections += [
+            Section("Views", lambda scale: draw_cameras(state, viewpoint, scale), open_first=True),
+            Section("Export", lambda scale: draw_export(exporting, state, scale)),
+            Section("Cameras", lambda scale: draw_kept_views(viewpoint, scale), open_first=True),
+        ]
         hooks.each_frame.append(exporting.poll)
         hooks.opened.append(exporting.forget)
         hooks.status.append(exporting.status)
-
-    # ---- frames
 
     def loop(self) -> None:
         """Input, time, splats if anything changed, overlay, swap; sleeps while all is still."""
@@ -280,8 +279,8 @@ class Viewer:
         size, scale = window.logical_size, window.ui_scale
         state.most_sliders = MOST_SLIDERS if size[1] >= LOW_WINDOW * scale else 1
         rows, wanted = len(state.sliders), self.settings.panel_open
-        both = state.split.on
-        return lay_out(size, scale, rows, state.has_legend, wanted, state.overlay, both)
+        shown = (wanted, state.overlay, state.split.on, self.hooks.film())
+        return lay_out(size, scale, rows, state.has_legend, *shown)
 
     def _free_wanted(self) -> np.ndarray:
         """(4,) pixels: the part of the window that the overlay leaves free."""
@@ -365,6 +364,7 @@ class Viewer:
                 ),
                 draw_slider_bar(state, layout.bar, scale),
                 draw_status(state, words, layout.status, scale),
+                *([self.films.panel.draw_strip(layout.strip, scale)] if layout.strip else ()),
                 *[box for draw in hooks.cards if (box := draw(layout.free, scale)) is not None],
             ]
         if not state.save_picture:  # what is said is no part of a picture

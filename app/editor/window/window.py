@@ -110,6 +110,7 @@ class Window:
         self._monitor_size = self._size_for_monitor()
         theme.apply(self.ui_scale)
         self._restyle = False  # the next frame's type has another size
+        self.every_letter = False  # of all languages: their list has been opened
         self.presented = Presented(self.ctx, lambda: self.size)
         self.textures = Textures(self.ctx, self.presented.renderer)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
@@ -121,8 +122,7 @@ class Window:
         self._raw: list[Event] = []
         self._chorded: set[int] = set()  # keys that are down for a shortcut, not for moving
         self._pressed: str | None = None  # the button whose drag the scene owns
-        self._last_click = (0.0, 0.0, -1.0)  # x, y, seconds
-        self._cursor = (0.0, 0.0)
+        self._cursor, self._last_click = (0.0, 0.0), (0.0, 0.0, -1.0)  # x, y; and seconds
         self._unsettled, self._look_again = SETTLE_FRAMES, np.inf  # frames; seconds by glfw
         self._clock = glfw.get_time()
         self._listen()
@@ -162,9 +162,10 @@ class Window:
         self._chosen_size = size
         self.restyle()
 
-    def restyle(self) -> None:
-        """The next frame has other letters: another language."""
+    def restyle(self, every_letter: bool = False) -> None:
+        """The next frame has other letters: another language, or those of all from now on."""
         self._restyle = True
+        self.every_letter |= every_letter
         self.note()
 
     def _size_for_monitor(self) -> float:
@@ -248,7 +249,7 @@ class Window:
         """
         if self._restyle:
             self._restyle = False
-            theme.apply(self.ui_scale)
+            theme.apply(self.ui_scale, every_letter=self.every_letter)
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*self.logical_size)
         io.display_framebuffer_scale = imgui.ImVec2(*[self._window.pixel_ratio] * 2)
@@ -351,8 +352,7 @@ class Window:
     def on_button(self, handle, button: int, action: int, mods: int) -> None:
         if button not in BUTTONS:
             return
-        io = imgui.get_io()
-        x, y = self._cursor
+        io, (x, y) = imgui.get_io(), self._cursor
         if button == glfw.MOUSE_BUTTON_LEFT:
             self.on_press(None) if action == glfw.PRESS else self.on_release()
         io.add_mouse_button_event(button, action == glfw.PRESS)

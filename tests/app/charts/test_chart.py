@@ -105,6 +105,9 @@ def test_quick_chart_of_a_tiny_scene(package, tmp_path, capsys):
     assert not list(out.glob("*.part"))
 
 
+FEW = ("--frames", "2")  # where figures are not looked at
+
+
 def test_rows_that_are_there_are_kept(package, tmp_path, monkeypatch):
     """Ctrl-C in the third row loses none of two; the same command goes on behind them."""
     out, row, asked = tmp_path / "out", Pricing.row, []
@@ -116,16 +119,16 @@ def test_rows_that_are_there_are_kept(package, tmp_path, monkeypatch):
         return row(self, named, pictures)
 
     monkeypatch.setattr(Pricing, "row", interrupted)
-    assert quick(package, out) == cli.INTERRUPTED
+    assert quick(package, out, *FEW) == cli.INTERRUPTED
     _, before = read_table(out / "rows.csv")
     assert len(before) == 2
-    assert quick(package, out) == 0
+    assert quick(package, out, *FEW) == 0
     _, after = read_table(out / "rows.csv")
     names = [n.name for n in settings_of("tiles", quick=True)]
     assert after[:2] == before and [r["name"] for r in after] == names
     assert asked == names[:3] + names[2:]
     asked.clear()
-    assert quick(package, out) == 0 and asked == []  # complete: drawn again, not measured
+    assert quick(package, out, *FEW) == 0 and asked == []  # complete: drawn again, not measured
 
 
 def test_rows_of_something_else_are_refused(package, tmp_path, capsys):
@@ -133,16 +136,16 @@ def test_rows_of_something_else_are_refused(package, tmp_path, capsys):
     out.mkdir()
     for text in ("", "a,b\n1,2\n", "# python3 launch.py chart other.shift --out DIR\n", "\x00\xff"):
         (out / "rows.csv").write_text(text, encoding="latin-1")
-        assert quick(package, out) == cli.BAD_INPUT
+        assert quick(package, out, *FEW) == cli.BAD_INPUT
         told = capsys.readouterr().err
         assert "rows.csv is of another run" in told and told.count("\n") == 1
         assert (out / "rows.csv").read_text(encoding="latin-1") == text
 
 
 def test_a_scene_that_has_changed_is_another_run(package, tmp_path, capsys):
-    assert quick(package, tmp_path / "out") == 0
+    assert quick(package, tmp_path / "out", *FEW) == 0
     write_package(make_random_model(40, seed=1), package)
-    assert quick(package, tmp_path / "out") == cli.BAD_INPUT
+    assert quick(package, tmp_path / "out", *FEW) == cli.BAD_INPUT
     assert "of another run" in capsys.readouterr().err
 
 

@@ -172,7 +172,7 @@ def test_japanese_is_offered_where_a_font_has_its_letters(tmp_path, monkeypatch)
     monkeypatch.setattr(fonts, "has_letters", lambda path, letters: path.name == "ipag.ttf")
     assert is_offered("ja") and fonts.font_for("ja") == tmp_path / "ipag.ttf"
     use_language("ja")
-    assert fonts.more_letters() == tmp_path / "ipag.ttf"
+    assert fonts.more_letters() == [tmp_path / "ipag.ttf"]
     use_language("en")
-    assert fonts.more_letters() is None
+    assert fonts.more_letters() == [] and fonts.more_letters(every=True) == [tmp_path / "ipag.ttf"]
     fonts.font_for.cache_clear()

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from shapeshift.app.editor.panels import panel
 from shapeshift.app.editor.texts import table as texts_table
 from shapeshift.renderer.debug.debug import REASON_TEXTS
 from tests.support.sources import nodes_of
@@ -56,7 +57,7 @@ TABLES_BESIDE = {
     "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "UNSAVED": ALL},
     "editor.window.recovering": {"ANSWERS": ALL},
     "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},
-    "film.window.films": {"AROUND": ALL, "PAST": ALL},
+    "film.window.film_panel": {"AROUND": ALL, "PAST": ALL, "TRACK_NAMES": ALL},
     "inspection.window.inspect_panel": {
         "COLUMNS": ALL, "BOUND_TIPS": ALL, "VALUE_TIPS": ALL, "AUTO_TIPS": ALL, "MEASURES": ALL,
         "EMISSIVITY": ALL,
@@ -181,6 +182,8 @@ def overlay_texts() -> set[str]:
         module = importlib.import_module(f"{PANELS}.{name}")
         for table, what in tables.items():
             found |= set(texts_of(getattr(module, table), what))
+    for tool in (*panel.TOOLS, panel.SETUP):
+        found |= {tool.name, tool.what, tool.missing}
     for name, tables in TABLES_BESIDE.items():
         module = importlib.import_module(f"shapeshift.app.{name}")
         for table, what in tables.items():

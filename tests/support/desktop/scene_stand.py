@@ -32,7 +32,7 @@ def viewer_on(window, renderer, found: OpenedFiles, pictures: Path, x: str = "")
 def viewer_on_wall(window, renderer, wall: Path, x: str = "") -> Viewer:
     """For tools of inspection: the sections above theirs are closed."""
     viewer = viewer_on(window, renderer, read(wall), wall.parent / "work" / "pictures", x)
-    viewer.shell.actions.sections.update({"Stops": False, "Look": False, "Camera": False})
+    viewer.shell.actions.sections.update({"Stops": False, "Look": False, "Views": False})
     run_frames(viewer, 4)
     return viewer
 

@@ -2,11 +2,18 @@
 
 from imgui_bundle import imgui
 
+from shapeshift.app.editor.panels import panel
+
 Box = tuple[float, float, float, float]
 KINDS = (
     "button", "checkbox", "selectable", "combo", "slider_float", "slider_int", "drag_float",
     "drag_float3", "input_text", "input_text_with_hint", "color_edit3", "invisible_button",
 )  # fmt: skip
+
+
+def every_section(monkeypatch) -> None:
+    """The panel shows those of all tools below each other, whatever tool is chosen."""
+    monkeypatch.setattr(panel, "of_tool", lambda tool, sections: sections)
 
 
 class Widgets:

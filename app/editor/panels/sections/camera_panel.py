@@ -1,4 +1,4 @@
-"""The panel's section "Camera": views from all sides, those of a file, and keeping views in one."""
+"""The panel's section "Views": from all sides, the scene's own, cameras of a file; the lens."""
 
 import math
 from collections.abc import Callable
@@ -13,6 +13,7 @@ from shapeshift.app.editor.panels.widgets.panel_rows import (
     item_label,
     labelled_slider,
     subsection,
+    symbol_button,
     tip,
 )
 from shapeshift.app.editor.state.arrange import edit
@@ -21,11 +22,12 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.texts.table import said
 from shapeshift.scene.cameras.write_cameras import FORMS
 from shapeshift.scene.document import edits
-from shapeshift.scene.document.scene_file import NamedView, SceneFile
+from shapeshift.scene.document.scene_file import FirstView, NamedView, SceneFile
 
-# Of the panel's section "Camera": its lens and its ways, and the scene's named views.
+# The lens, and the scene's own views: a list, a plus, a star for the first one.
 
 Vec = imgui.ImVec2
+STAR = "\uf005"
 FOV_DEGREES = (10.0, 120.0)
 SPEEDS = (0.05, 20.0)  # times the usual one
 NEAREST_RADII, FARTHEST_RADII = 0.001, 2.0  # of the scene: what the near plane can be
@@ -68,38 +70,50 @@ def draw_lens(viewpoint: Viewpoint, ui_scale: float) -> None:
 
 
 def draw_named_views(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> None:
-    """Views of the scene by their names: go there, rename, take out; add that of now."""
+    """Views of the scene by their names: go there, rename, take out, open the scene with one; add
+    that of now.
+    """
     if not state.scene.objects:
         return
+    side = imgui.get_frame_height()
+    if imgui.button(item_label("+ View"), Vec(-side - imgui.get_style().item_spacing.x, 0)):
+        _edit(state, lambda file: edits.keep_view(file, viewpoint.stated()), "add a view")
+    tip("The view of now under a name, in the scene file once it is saved.", ui_scale)
+    imgui.same_line()
+    if symbol_button("star of now", STAR, side, False):
+        begin_with(state, viewpoint.stated())
+    tip("The scene opens with the view of now, once it is saved.", ui_scale)
     for named in state.edited.file.views:
         imgui.push_id(named.name)
         _row(state, viewpoint, named, ui_scale)
         imgui.pop_id()
-    gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
-    if imgui.button(item_label("Add view"), Vec((room - gap) / 2, 0)):
-        _edit(state, lambda file: edits.keep_view(file, viewpoint.stated()), "add a view")
-    tip("The view of now under a name, in the scene file once it is saved.", ui_scale)
-    imgui.same_line()
-    if imgui.button(item_label("Start here"), Vec(-1, 0)):
-        _edit(state, lambda file: edits.look_from(file, viewpoint.stated()), "first look")
-        state.say(said("The scene opens with this view, once it is saved."))
-    tip("The scene opens with the view of now, once it is saved.", ui_scale)
+
+
+def begin_with(state: EditorState, view: FirstView) -> None:
+    """The scene opens with a view."""
+    _edit(state, lambda file: edits.look_from(file, view), "first look")
+    state.say(said("The scene opens with this view, once it is saved."))
 
 
 def _row(state: EditorState, viewpoint: Viewpoint, named: NamedView, ui_scale: float) -> None:
-    """The name, which can be typed, between going there and taking it out."""
+    """The name, which can be typed, between going there, the star, and taking it out."""
     side = imgui.get_frame_height()
     if imgui.arrow_button("go", imgui.Dir.right):
         viewpoint.go_to(named.view)
     tip(said("Goes to {name}.", name=named.name), ui_scale)
     imgui.same_line()
-    imgui.set_next_item_width(imgui.get_content_region_avail().x - side - 8 * ui_scale)
+    gap = imgui.get_style().item_spacing.x
+    imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * (side + gap))
     entered = imgui.InputTextFlags_.enter_returns_true
     changed, text = imgui.input_text("##name", named.name, entered)
     tip("Its name; Enter takes it over.", ui_scale)
     if changed and text != named.name:
         what = f"rename {named.name}"
         _edit(state, lambda file: edits.rename_view(file, named.name, text), what)
+    imgui.same_line()
+    if symbol_button(f"star {named.name}", STAR, side, named.view == state.edited.file.view):
+        begin_with(state, named.view)
+    tip(said("The scene opens with {name}, once it is saved.", name=named.name), ui_scale)
     imgui.same_line()
     if imgui.button("\u00d7", Vec(-1, 0)):
         _edit(state, lambda file: edits.remove_view(file, named.name), f"take out {named.name}")
@@ -152,8 +166,8 @@ def draw_edges(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> Non
 
 
 def draw_cameras(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> None:
-    """Views from all sides, the camera's ways, cameras of a file, keeping views."""
-    steps, kept = viewpoint.steps, viewpoint.kept
+    """Views from all sides, the scene's own, cameras of a file, the lens."""
+    steps = viewpoint.steps
     if clicked := button_row(SIDES, ui_scale, len(SIDES)):
         viewpoint.look_from(clicked.lower())
     flying = WAYS[viewpoint.camera.flying]
@@ -169,13 +183,18 @@ def draw_cameras(state: EditorState, viewpoint: Viewpoint, ui_scale: float) -> N
     }
     if clicked := button_row(moves, ui_scale, len(moves)):
         deeds[clicked]()
-    draw_lens(viewpoint, ui_scale)
     draw_named_views(state, viewpoint, ui_scale)
     if steps.count:
         imgui.text_disabled(steps.text)
         clicked = button_row(STEPS, ui_scale, 2)
         if clicked:
             viewpoint.step_to_camera(1 if clicked == "Next" else -1)
+    draw_lens(viewpoint, ui_scale)
+
+
+def draw_kept_views(viewpoint: Viewpoint, ui_scale: float) -> None:
+    """The panel's section "Cameras": views in a file for other programs."""
+    kept = viewpoint.kept
     gap, room = imgui.get_style().item_spacing.x, imgui.get_content_region_avail().x
     if imgui.button(item_label("Keep view"), Vec((room - gap) / 2, 0)):
         viewpoint.keep_view()

@@ -255,9 +255,6 @@ def _scene(objects: ObjectEdits, ui_scale: float) -> None:
         tip("How high the floor lies. Drag, or double click to type.", ui_scale)
         if moved and np.isfinite(y):
             objects.edit(edits.ground, float(y), what="move the floor", together="floor")
-    if imgui.button(item_label("Look from here first"), Vec(-1, 0)):
-        objects.look_from_here()
-    tip("The scene opens with the view of now.", ui_scale)
     if stands_elsewhere(state):
         if imgui.button(item_label("Keep as it stands"), Vec(-1, 0)):
             objects.keep_standing()

@@ -92,6 +92,25 @@ def tip(text: str, ui_scale: float) -> None:
     imgui.end_tooltip()
 
 
+def centred_text(text: str, middle: imgui.ImVec2, size: float, ink: int) -> None:
+    """A line of a size of its own about a place."""
+    imgui.push_font(None, size)
+    room = imgui.calc_text_size(text)
+    at = Vec(middle.x - room.x / 2, middle.y - room.y / 2)
+    imgui.get_window_draw_list().add_text(at, ink, text)
+    imgui.pop_font()
+
+
+def symbol_button(name: str, symbol: str, side: float, lit: bool) -> bool:
+    """A square with a letter of the font of symbols; True when it was clicked."""
+    corner = imgui.get_cursor_screen_pos()
+    clicked = imgui.invisible_button(name, Vec(side, side))
+    ink = theme.ACCENT if lit or imgui.is_item_hovered() else theme.MUTED
+    middle = Vec(corner.x + side / 2, corner.y + side / 2)
+    centred_text(symbol, middle, 0.6 * side, theme.color(ink))
+    return clicked
+
+
 def open_slider(
     name: str, value: float, low: float, high: float, text: str, any_text: str
 ) -> float:

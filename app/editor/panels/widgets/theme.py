@@ -12,6 +12,9 @@ Box = tuple[float, float, float, float]  # left, top, right, bottom in logical p
 FONT_SIZE = 15.0  # logical pixels
 FONT = Path(imgui_bundle.__file__).parent / "assets/fonts/Roboto/Roboto-Regular.ttf"
 
+# Its symbols of the bar of tools are letters above U+F000 (SIL OFL 1.1).
+SYMBOLS = Path(imgui_bundle.__file__).parent / "assets/fonts/Font_Awesome_6_Free-Solid-900.otf"
+
 BEYOND = (3.0, 3.0)  # logical pixels that items reach beyond their edges for a ray or a finger
 
 ACCENT = (0.95, 0.63, 0.27)
@@ -43,21 +46,23 @@ def has_keys() -> bool:
     return not imgui.get_io().config_flags & imgui.ConfigFlags_.no_keyboard
 
 
-def apply(ui_scale: float, keys: bool = True) -> None:
+def apply(ui_scale: float, keys: bool = True, every_letter: bool = False) -> None:
     """Styles the current ImGui context, between frames alone.  ImGui rasters the letters that it
     needs at the density of the framebuffer.
 
-    Without `keys` a ray or a finger points at it: all that can be hit is larger.
+    Without `keys` a ray or a finger points at it: all that can be hit is larger.  every_letter: of
+    all languages that are offered, not of the one in use alone.
     """
     io = imgui.get_io()
+    io.config_input_text_cursor_blink = False  # at rest no frame is drawn
     if not keys:
         io.config_flags |= imgui.ConfigFlags_.no_keyboard | imgui.ConfigFlags_.is_touch_screen
     io.fonts.clear()
     io.fonts.add_font_from_file_ttf(str(FONT), FONT_SIZE)
-    if (more := more_letters()) is not None:
+    for path in [SYMBOLS] * keys + more_letters(every_letter):
         config = imgui.ImFontConfig()
         config.merge_mode = True
-        io.fonts.add_font_from_file_ttf(str(more), FONT_SIZE, config)
+        io.fonts.add_font_from_file_ttf(str(path), FONT_SIZE, config)
 
     style = imgui.get_style()
     _unscale(style)

@@ -31,6 +31,7 @@ class ProgramSettings:
     palette: str = ""  # of value stops; "": the scene's own
     place: tuple[int, int, int, int] | None = None  # left, top, width, height of the window
     sections: dict[str, bool] = field(default_factory=dict)  # of the panel, that a hand has moved
+    tool: str = ""  # of the bar; "": the first
 
     @staticmethod
     def read(folder: Path) -> "ProgramSettings":
@@ -48,6 +49,7 @@ class ProgramSettings:
             a_word(found.get("palette")),
             a_place(found.get("place")),
             some_sections(found.get("sections")),
+            a_word(found.get("tool")),
         )
 
     def keep(self) -> None:

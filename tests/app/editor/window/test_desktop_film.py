@@ -18,9 +18,10 @@ from tests.support.desktop.widgets import Widgets
 
 @pytest.fixture
 def only(monkeypatch):
-    """Folds all sections but one."""
+    """Takes a tool, and folds all its sections but one."""
 
-    def fold_all_but(name: str) -> None:
+    def fold_all_but(viewer, tool: str, name: str) -> None:
+        viewer.shell.choose_tool(tool)
         monkeypatch.setattr(panel, "section", lambda other, *_: other == name)
 
     return fold_all_but
@@ -29,7 +30,7 @@ def only(monkeypatch):
 @pytest.fixture
 def film(viewer, hands, only, monkeypatch):
     """(viewer, hands, widgets) with the section Film open, its strip as a function of seconds."""
-    only("Film")
+    only(viewer, "Film", "Film")
     widgets = Widgets(monkeypatch)
     run_frames(viewer, 3)
     return viewer, hands, widgets
@@ -41,6 +42,28 @@ def at(viewer, widgets, seconds: float, row: int) -> tuple[float, float]:
     pad = 8 * viewer.window.ui_scale
     share = seconds / viewer.state.timeline.keys.seconds
     return left + pad + (right - left - 2 * pad) * share, top + (low - top) * (0.25 + 0.5 * row)
+
+
+def test_the_timeline_lies_over_the_whole_lower_edge(film):
+    """From the left edge of the window to the right one, above the status line; its cross and any
+    other tool put it away, and the keys stay.
+    """
+    viewer, hands, widgets = film
+    width, _ = viewer.window.logical_size
+    strip, free = viewer.layout.strip, viewer.layout.free
+    assert strip[0] == 0 and strip[2] == width and strip[3] == viewer.layout.status[1]
+    assert strip in viewer.window.covered and viewer.layout.bar[3] <= strip[1]
+    left, _, right, _ = widgets.boxes["timeline"]
+    assert right - left > 0.85 * width
+    hands.click(*widgets.middle("Key view"))
+    hands.click(*widgets.middle("\u00d7"))
+    assert viewer.layout.strip is None and viewer.layout.free[3] > free[3]
+    assert len(viewer.state.timeline.keys.cameras) == 1
+    hands.click(*widgets.middle("Film"))
+    assert viewer.layout.strip == strip
+    viewer.state.overlay = False
+    run_frames(viewer, 1)
+    assert viewer.layout.strip is None
 
 
 def test_keys_are_set_dragged_deleted_and_brought_back(film):
@@ -164,7 +187,7 @@ def test_a_video_that_wants_an_extra_offers_it(film, monkeypatch):
 
 
 def test_two_stops_are_picked_by_clicks_and_slid_between(viewer, hands, only, monkeypatch):
-    only("Gallery")
+    only(viewer, "Style", "Gallery")
     widgets = Widgets(monkeypatch)
     end = time.monotonic() + 30
     run_frames(viewer, 2)

@@ -19,7 +19,7 @@ from shapeshift.rasterizer.program import announce
 from shapeshift.renderer.renderer import Renderer
 from tests.support.desktop.desktop_stand import run_frames
 from tests.support.desktop.real_hands import RealHands
-from tests.support.desktop.widgets import Widgets
+from tests.support.desktop.widgets import Widgets, every_section
 
 SIZES = [(800, 600), (1280, 720), (3840, 2160)]
 
@@ -198,6 +198,7 @@ def test_no_slider_of_the_panel_lies_over_its_number(any_size, monkeypatch):
     from shapeshift.app.editor.panels.widgets import panel_rows
 
     monkeypatch.setattr(panel, "section", lambda *_, **__: True)
+    every_section(monkeypatch)
     for module in (plain_sections, quality_panel):
         monkeypatch.setattr(module, "subsection", lambda *_, **__: True)
     lines: list[float] = []

@@ -1,17 +1,23 @@
 """The panel in the real window: its order, tips, the sheet of keys, the empty window, views."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 
 from shapeshift.app.editor.panels import panel
 from shapeshift.app.editor.panels.sections import camera_panel, plain_sections, quality_panel
 from shapeshift.app.editor.panels.widgets.boxes import can_browse
+from shapeshift.app.editor.state.user.settings import ProgramSettings
+from shapeshift.app.editor.texts.table import language_in_use
+from shapeshift.app.editor.window import shell
 from shapeshift.app.editor.window.shell import GROUPS, spread
 from shapeshift.app.paths import TOUCH
 from tests.support.desktop.desktop_stand import run_frames, until_opened
 from tests.support.desktop.objects_stand import names
 from tests.support.desktop.real_hands import RealHands
-from tests.support.desktop.widgets import Widgets
+from tests.support.desktop.widgets import Widgets, every_section
 
 
 @pytest.fixture
@@ -24,6 +30,7 @@ def unfolded(monkeypatch):
         return True
 
     monkeypatch.setattr(panel, "section", opened)
+    every_section(monkeypatch)
     for module in (plain_sections, camera_panel, plain_sections, quality_panel):
         monkeypatch.setattr(module, "subsection", opened)
     return seen
@@ -43,23 +50,99 @@ def test_everything_in_the_panel_explains_itself(touch_viewer, unfolded, monkeyp
     assert not silent, "\n".join(silent)
 
 
-def test_first_comes_what_a_first_visitor_needs(viewer, unfolded):
+def test_every_section_has_its_tool(viewer, unfolded):
+    """All that the parts of the program bring is reached, and at most nine symbols lead there."""
+    brought = {section.name for section in viewer.hooks.sections}
+    tools = (*panel.TOOLS, panel.SETUP)
+    assert brought == {name for tool in tools for name in tool.sections}
+    assert len(panel.TOOLS) <= 9 and len({tool.symbol for tool in tools}) == len(tools)
     run_frames(viewer, 1)
-    sections = [name for name in unfolded if name in panel.ORDER]
-    assert sections == [
-        "Stops", "Look", "Inspect", "Measure", "Gallery", "Camera", "Film", "Objects", "Parts",
-        "Regions", "Sections", "Export", "Settings", "Performance",
-    ]  # fmt: skip
     inside = unfolded[unfolded.index("Performance") + 1 :]
     assert [n for n in inside if n in ("Budget", "Quality", "Passes", "Counts", "Machine")] == [
         "Budget", "Quality", "Passes", "Counts", "Machine",
     ]  # fmt: skip
 
 
-def test_things_come_second_where_there_are_several(touch_viewer, unfolded):
-    run_frames(touch_viewer, 1)
-    sections = [name for name in unfolded if name in panel.ORDER]
-    assert sections[:3] == ["Touch", "Objects", "Stops"]
+def drawn(viewer, monkeypatch) -> list[str]:
+    """The headings of the next frame."""
+    seen: list[str] = []
+    plain = panel.section
+    monkeypatch.setattr(
+        panel, "section", lambda name, *more: seen.append(name) or plain(name, *more)
+    )
+    run_frames(viewer, 1)
+    monkeypatch.setattr(panel, "section", plain)
+    return seen
+
+
+def test_a_symbol_shows_its_own_sections_and_stays_chosen(viewer, hands, tmp_path, monkeypatch):
+    viewer.settings.folder = tmp_path
+    widgets = Widgets(monkeypatch)
+    run_frames(viewer, 2)
+    for tool in (*panel.TOOLS[::-1], panel.SETUP):
+        label = "setup" if tool is panel.SETUP else tool.name
+        hands.click(*widgets.middle(label))
+        assert ProgramSettings.read(tmp_path).tool == tool.name == viewer.settings.tool
+        shown = [s.name for s in viewer.hooks.sections if s.shown is None or s.shown()]
+        assert drawn(viewer, monkeypatch) == [name for name in tool.sections if name in shown]
+    hands.click(*widgets.middle("setup"))  # once more: back to the scene
+    assert viewer.settings.tool == panel.TOOLS[0].name
+    viewer.settings.tool = "a tool of another version"
+    assert drawn(viewer, monkeypatch) == list(panel.TOOLS[0].sections)
+
+
+@pytest.mark.parametrize(
+    ("key", "held", "tool"),
+    [
+        ("y", (), "Inspect"), ("y", ("Shift_L",), "Measure"), ("o", ("Shift_L",), "Cut"),
+        ("o", (), "Parts"),
+    ],
+)  # fmt: skip
+def test_a_key_opens_its_tool(viewer, hands, key, held, tool, monkeypatch):
+    widgets = Widgets(monkeypatch)
+    viewer.settings.sections[panel.chosen_tool(tool).sections[0]] = False  # folded by a hand once
+    hands.key(key, *held)
+    run_frames(viewer, 2)
+    assert viewer.settings.tool == tool
+    opened = {"Inspect": "above", "Measure": "Way", "Cut": "+ cut box", "Parts": "Floaters"}
+    assert opened[tool] in widgets.boxes
+
+
+def test_things_open_the_tool_that_touches_them(touch_viewer, monkeypatch):
+    assert touch_viewer.settings.tool == "Touch"
+    assert drawn(touch_viewer, monkeypatch) == ["Touch", "Objects"]
+
+
+def test_a_body_that_comes_later_takes_no_tool_out_of_the_hand(viewer, monkeypatch):
+    called = {"Touch": True}
+    wanted = next(s for s in viewer.hooks.sections if s.name == "Touch")
+    touch = replace(wanted, opens=lambda: called.pop("Touch", False))
+    viewer.hooks.sections[viewer.hooks.sections.index(wanted)] = touch
+    viewer.parts.toggle()
+    run_frames(viewer, 2)
+    assert viewer.settings.tool == "Parts" and not called
+    called["Touch"] = True
+    viewer.parts.toggle()
+    run_frames(viewer, 2)
+    assert viewer.settings.tool == "Touch"
+
+
+@pytest.mark.parametrize("letters", [True, False])
+def test_languages_are_under_the_globe(viewer, hands, letters, monkeypatch):
+    """Each in its own letters where a font has them, else the sentence that says why not."""
+    widgets, said = Widgets(monkeypatch), []
+    monkeypatch.setattr(shell, "is_offered", lambda code: code != "ja" or letters)
+    plain = imgui.text_disabled
+    monkeypatch.setattr(imgui, "text_disabled", lambda text: said.append(text) or plain(text))
+    run_frames(viewer, 2)
+    hands.click(*widgets.middle("globe"))
+    assert {"English", "Deutsch"} <= widgets.boxes.keys() and viewer.window.every_letter
+    assert ("\u65e5\u672c\u8a9e" in widgets.boxes) == letters
+    assert any("Nihongo (Japanese) is not offered" in text for text in said) != letters
+    hands.click(*widgets.middle("Deutsch"))
+    assert viewer.settings.language == "de" == language_in_use().code
+    viewer.shell.speak("en")
+    run_frames(viewer, 2)
 
 
 def test_what_is_for_developers_is_folded_at_first(viewer, monkeypatch):
@@ -105,12 +188,50 @@ def test_f1_opens_and_closes_the_sheet_of_all_keys(viewer, hands, monkeypatch):
     assert not viewer.shell.keys_open
 
 
+def test_the_sheet_is_searched_and_begins_with_the_tool_in_hand(viewer, hands, monkeypatch):
+    drawn: list[list[str]] = []
+    plain = shell.spread
+    monkeypatch.setattr(
+        shell, "spread", lambda groups, n: drawn.append([*groups]) or plain(groups, n)
+    )
+    viewer.shell.choose_tool("Measure")
+    hands.key("F1")
+    assert drawn[-1][0] == "Measure" and set(drawn[-1]) == {*GROUPS, *viewer.hooks.keys}
+    x, view = viewer.state.scene.objects[0].x, viewer.viewpoint.view().eye_from_world()
+    hands.type("undo")
+    assert drawn[-1] == ["Program"]
+    hands.type(" 2 w")
+    assert viewer.shell.keys_open and drawn[-1] == []
+    run_frames(viewer, 5)  # typed, not obeyed
+    assert viewer.state.scene.objects[0].x == x
+    np.testing.assert_array_equal(viewer.viewpoint.view().eye_from_world(), view)
+    hands.key("Escape")
+    assert not viewer.shell.keys_open
+    hands.key("F1")
+    assert len(drawn[-1]) == len({*GROUPS, *viewer.hooks.keys})  # a new search
+    hands.type("undo")
+    hands.key("F1")
+    assert not viewer.shell.keys_open
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("", ["b", "a"]), ("ALL", ["b"]), ("f12", ["a"]), ("hide  all", ["b"]), ("nothing", []),
+        ("b", ["b"]),
+    ],
+)  # fmt: skip
+def test_rows_are_found_by_words_of_key_deed_or_heading(words, found):
+    groups = {"a": [("F12", "save")], "b": [("H", "hide all this")]}
+    assert list(shell.found_groups(groups, ("b", "not there"), words)) == found
+
+
 def test_every_key_that_does_something_stands_on_the_sheet(viewer):
     """The letters that the program's own handlers match, read from their source."""
     import inspect
     import re
 
-    from shapeshift.app.editor.window import hands, objects, shell, touch, two_pictures
+    from shapeshift.app.editor.window import hands, objects, touch, two_pictures
     from shapeshift.app.editor.window import window as window_module
 
     told = " ".join(key for rows in GROUPS.values() for key, _ in rows)

@@ -7,6 +7,7 @@ import glfw
 import numpy as np
 import pytest
 
+from shapeshift.app.editor.panels.sections.camera_panel import begin_with
 from shapeshift.app.editor.state.arrange import steer
 from shapeshift.app.editor.state.files.edited_file import stamp_of
 from shapeshift.app.editor.state.files.journal import Journal
@@ -232,7 +233,7 @@ def test_the_floor_and_the_first_look_are_edits(viewer, tmp_path):
     assert state.world.paused and list(state.world.objects) == NAMES
     viewer.viewpoint.camera.turn(0.3, -0.1)
     run_frames(viewer, 60)
-    objects.edits.look_from_here()
+    begin_with(state, viewer.viewpoint.stated())
     eye = viewer.viewpoint.view().world_from_eye.position
     assert state.edited.file.view.eye == pytest.approx(eye, abs=1e-6)
     assert objects.saving.named(str(tmp_path / "a"))

@@ -19,7 +19,7 @@ from shapeshift.app.editor.texts.table import use_language
 from shapeshift.app.editor.window.monitor import place_of, put_window
 from tests.support.desktop.desktop_stand import PlainRenderer, ball, read_stub, run_frames
 from tests.support.desktop.real_hands import RealHands
-from tests.support.desktop.widgets import Widgets
+from tests.support.desktop.widgets import Widgets, every_section
 
 
 @pytest.fixture
@@ -64,6 +64,7 @@ def test_no_label_is_wider_than_its_button(viewer, code, monkeypatch):
 
     monkeypatch.setattr(imgui, "button", button)
     monkeypatch.setattr(panel, "section", lambda *_, **__: True)
+    every_section(monkeypatch)
     viewer.parts.toggle()
     viewer.shell.speak(code)
     run_frames(viewer, 4)
@@ -79,7 +80,7 @@ def test_settings_stay(viewer, hands, window, tmp_path, monkeypatch):
     left, *_ = viewer.window.covered[0]
     high = widgets.boxes["Front"][1]
     before = dict(viewer.settings.sections)
-    hands.click(left + 40, high - 14)  # the heading of the camera's buttons
+    hands.click(left + 100, high - 14)  # the heading of the camera's buttons
     toggled = {k for k in viewer.settings.sections if k not in before}
     assert toggled and json.loads(file.read_text())["sections"] == viewer.settings.sections
     viewer.state.choose_palette("turbo")

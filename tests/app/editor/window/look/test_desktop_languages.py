@@ -11,6 +11,7 @@ from shapeshift.app.editor.texts.table import ENGLISH, Language, all_languages, 
 from shapeshift.app.editor.window.window import KeyDown
 from tests.support.desktop.desktop_stand import run_frames
 from tests.support.desktop.overlay_texts import is_text
+from tests.support.desktop.widgets import every_section
 
 # The same everywhere: formats of files, things numbered under their own names, drivers' words; and
 # edits, which "Undo" names as the program knows them.
@@ -50,6 +51,7 @@ def asked(monkeypatch):
     """With every heading open and every tip shown, whatever the mouse is at."""
     found = Asked()
     tree = imgui.tree_node_ex
+    every_section(monkeypatch)
     monkeypatch.setattr(imgui, "tree_node_ex", lambda *given: bool(tree(*given)) or True)
     monkeypatch.setattr(imgui, "is_item_hovered", lambda *given: True)
     monkeypatch.setitem(all_languages(), "xx", Language("xx", "Noted", found))

@@ -29,7 +29,7 @@ def viewer(window, tmp_path):
 @pytest.fixture
 def widgets(viewer, monkeypatch, request):
     """With one section alone, so that nothing has to be scrolled to."""
-    wanted = "Look" if "look" in request.node.name or "chosen" in request.node.name else "Camera"
+    wanted = "Look" if "look" in request.node.name or "chosen" in request.node.name else "Views"
     monkeypatch.setattr(panel, "section", lambda name, *_, **__: name == wanted)
     for module in (plain_sections, camera_panel):
         monkeypatch.setattr(module, "subsection", lambda *_: True)
@@ -151,13 +151,13 @@ def test_a_drag_turns_about_what_was_pressed(viewer, hands, widgets):
 
 def test_named_views_are_added_gone_to_and_taken_out(viewer, hands, widgets):
     state, viewpoint = viewer.state, viewer.viewpoint
-    hands.click(*widgets.middle("Add view"))
+    hands.click(*widgets.middle("+ View"))
     (first,) = state.edited.file.views
     before = viewpoint.view()
     hands.key("KP_7")  # straight from above, which a file states a little tilted
     run_frames(viewer, 80)
     above = viewpoint.view()
-    hands.click(*widgets.middle("Add view"))
+    hands.click(*widgets.middle("+ View"))
     assert [v.name for v in state.edited.file.views] == ["view 1", "view 2"]
     viewpoint.go_to(first.view)
     run_frames(viewer, 80)
@@ -171,8 +171,12 @@ def test_named_views_are_added_gone_to_and_taken_out(viewer, hands, widgets):
     )
     hands.key("z", "Control_L")
     assert [v.name for v in state.edited.file.views] == ["view 1"]
-    hands.click(*widgets.middle("Start here"))
-    assert state.edited.file.view is not None
+    hands.click(*widgets.middle("star of now"))
+    assert state.edited.file.view not in (None, first.view)
+    hands.click(*widgets.middle("star view 1"))
+    assert state.edited.file.view == first.view
+    hands.key("z", "Control_L")
+    assert state.edited.file.view != first.view
     hands.click(*widgets.middle("\u00d7"))
     assert state.edited.file.views == ()
 
