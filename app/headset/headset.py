@@ -216,7 +216,7 @@ def wear(options: Options) -> int:
             say_missing(link, options, worn)
             xr_app = XrApp(
                 session, renderer, eyes, mirror, document, editor, pacing, report, rules, wearing,
-                worn, shelf_of(options), shutter_of(options),
+                worn, shelf_of(options), shutter_of(options), journals_of(options),
             )  # fmt: skip
             try:
                 with interrupting(xr_app), closing(xr_app):
@@ -273,6 +273,14 @@ def shutter_of(options: Options) -> "Shutter":
     if options.record is not None:
         recorder.start(options.record)
     return Shutter(folder, recorder)
+
+
+def journals_of(options: Options) -> Path | None:
+    """Where unsaved work is kept; of a run that is measured none is."""
+    from shapeshift.app.paths import data_folder
+
+    measured = bool(options.frames or options.report or options.lines)
+    return None if measured else data_folder() / "journals"
 
 
 def shelf_of(options: Options) -> "SceneShelf":

@@ -159,7 +159,8 @@ def open_alone(path: Path, options: ReadingOptions, x: str = "") -> tuple[Docume
 def editor_of(world: World, edited: EditedFile) -> EditorState:
     """The editor's state over a world that lives already: what the panel's sections work on."""
     editor = EditorState(read_model)
-    editor.open_sources(tuple(edited.sources.values()), world.drawn(), None, edited)
+    sources = tuple(edited.source(item) for item in edited.file.all_items)  # two may be of one file
+    editor.open_sources(sources, world.drawn(), None, edited)
     editor.bodies.adopt(world, edited)
     editor.most_sliders = 1  # on the panel: the chosen object's
     editor.follow_world()

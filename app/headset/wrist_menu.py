@@ -50,6 +50,7 @@ from shapeshift.app.headset.sections.room_section import (
     tool_sections,
 )
 from shapeshift.app.headset.session.recorder import Recorder
+from shapeshift.app.headset.worn_journal import WornJournal
 from shapeshift.app.headset.xr_user import XrState
 from shapeshift.app.paths import WorkFolders
 from shapeshift.vr.frame import Frame
@@ -68,7 +69,7 @@ from shapeshift.vr.play_space import resized
 
 TICK = (0.25, 0.012)  # strength and seconds of the buzz when something is pointed at
 CLICK = (0.6, 0.025)  # when it is pressed, and when the knob comes to a stop
-SURE = "Choose it again to lose what was changed here."
+SURE = "This is not saved. Choose it again to leave; it is offered when you come back."
 SETTLE_FRAMES = 4  # after a change: what it changes in turn, and ImGui's own fading
 Vec = imgui.ImVec2
 
@@ -84,6 +85,7 @@ class MenuActions:
     picture: Callable[[], None] = lambda: None  # the next frame is one
     start_here: Callable[[Frame], None] = lambda frame: None
     recorder: Recorder | None = None
+    journal: WornJournal | None = None
 
 
 class WristMenu:
@@ -122,7 +124,12 @@ class WristMenu:
             draw_glass(state)  # first: looks are long, and it is the headset's own
             draw_look(editor, scale)
 
+        left: list[Section] = []
+        if (journal := self._actions.journal) is not None:
+            offers = lambda: journal.offers  # noqa: E731
+            left = [Section("Unsaved work", journal.draw, open_first=True, shown=offers)]
         return [
+            *left,
             Section("Room", lambda scale: draw_room(state, room), open_first=True),
             Section(
                 "Scale",
@@ -214,6 +221,7 @@ class WristMenu:
             state.figures if self._figures_seen else None, state.worn.now,
             self.shelf.opening, self.shelf.shown, self._recording(), state.glass.stop,
             state.tools.key(),
+            self._actions.journal is not None and self._actions.journal.offers,
         )  # fmt: skip
 
     def _fill(self) -> None:

@@ -4,6 +4,7 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
 import moderngl
 
@@ -25,6 +26,7 @@ from shapeshift.app.headset.scene_shelf import SceneShelf
 from shapeshift.app.headset.sections.performance_section import Figures
 from shapeshift.app.headset.session.headset_link import Comeback
 from shapeshift.app.headset.session.recorder import Shutter
+from shapeshift.app.headset.worn_journal import WornJournal
 from shapeshift.app.headset.worn_settings import WEARING, KeptSettings, Wearing
 from shapeshift.app.headset.wrist_menu import MenuActions, WristMenu
 from shapeshift.app.headset.xr_user import XrState, XrUser
@@ -70,12 +72,14 @@ class XrApp:
         worn: KeptSettings | None = None,
         shelf: SceneShelf | None = None,
         shutter: Shutter | None = None,
+        journals: Path | None = None,
     ) -> None:
         self.session, self.renderer, self.eyes, self.mirror = session, renderer, eyes, mirror
         self.report, self._wearing = report, wearing
         self._worn, self.shelf = worn or KeptSettings(), shelf or SceneShelf()
         self.shutter = shutter or Shutter(WorkFolders.of().pictures)
         self._obstacles = rules.obstacles  # the picture darkens in them
+        self._journals = journals  # folder; None: what is done is not kept
         self._closing = ExitStack()
         self._closing.callback(self.shutter.close)
         self._hand_glass = HandGlass(mirror.ctx, renderer)
@@ -124,11 +128,12 @@ class XrApp:
             sees_through=self.session.sees_through,
             glass=GlassState(stop_now(editor, self._wearing.glass)),
         )
+        self._journal = self._scene.enter_context(WornJournal(editor, self._journals))
         self._parts_hand = PartsHand(parts)
         self.state.tools.open(self._probe.measure, self._probe.inspect)
         actions = MenuActions(
             self.recentre, self.leave, self.pulse, self.shelf, self.shutter.press, self._keep_start,
-            self.shutter.recorder,
+            self.shutter.recorder, self._journal,
         )  # fmt: skip
         self.menu = WristMenu(self.state, actions, self.eyes.panel)
         self._over = OverSplats(self._wearing, self.eyes.panel, self._hand_glass)
@@ -287,6 +292,7 @@ class XrApp:
         editor.advance(seconds)
         editor.messages.ended(time.perf_counter())
         poll_bodies(editor)
+        self._journal.each_frame()
         return touch.advance(seconds)
 
     def draw(

@@ -8,6 +8,7 @@ import numpy as np
 from shapeshift.runtime_models.evaluate import Evaluator
 from shapeshift.runtime_models.model import AnchorModel
 from shapeshift.scene.cameras.upright import plane_of_most
+from shapeshift.scene.colliders.standing import Plane
 from shapeshift.scene.pose import View
 
 # Where anchors are and how they look at every stop: what completion compares.
@@ -57,23 +58,6 @@ LEAST_ANCHORS, LEAST_SHARE = 40, 0.2  # of the anchors around, that lie on it
 FARTHEST = 5.0  # spacings between the plane and the thing's lowest anchors
 LOWEST = 2.0  # percent of its anchors that may lie lower than what counts as its lowest
 Refused = str  # one sentence without the thing's name
-
-
-@dataclass(frozen=True)
-class Plane:
-    normal: np.ndarray  # (3,) unit, away from what carries
-    offset: float  # metres: normal . p of its points
-
-    def height(self, points: np.ndarray) -> np.ndarray:
-        """(N,) metres above the plane, of points (N, 3)."""
-        return points @ self.normal - self.offset
-
-    def axes(self) -> np.ndarray:
-        """(2, 3) unit vectors along the plane, at right angles."""
-        other = (1.0, 0.0, 0.0) if abs(self.normal[0]) < 0.9 else (0.0, 1.0, 0.0)
-        first = np.cross(self.normal, other)
-        first /= np.linalg.norm(first)
-        return np.stack([first, np.cross(self.normal, first)])
 
 
 def fit_plane(points: np.ndarray, within: float, seed: int = 0) -> tuple[Plane, np.ndarray] | None:

@@ -4,7 +4,7 @@ A moving body is its parts (a mesh of 2,500 faces takes an engine hundreds of ti
 mesh serves a background that stays where it is, the mass and a debug view.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,9 +73,11 @@ def collider_of_splats(
 
 
 def collider_of_model(
-    model: Model, x: Control, making: Making | None = None, eye: np.ndarray | None = None
-) -> Collider:
-    """The collider of a model as it is at control value x.  Raises BadFile.
+    model: Model, x: Control, making: Making | None = None, eye: np.ndarray | None = None,
+    mend: Callable[[Sequence[np.ndarray]], Sequence[np.ndarray]] | None = None,
+) -> Collider:  # fmt: skip
+    """The collider of a model as it is at control value x, of its splats mended, if at all.  Raises
+    BadFile.
 
     eye (3,) metres, in the object's frame: where a model is seen from whose shape depends on it;
     in front of it if not given.
@@ -84,7 +86,7 @@ def collider_of_model(
         low, high = np.percentile(model.anchors, (1, 99), axis=0)
         eye = (low + high) / 2 + np.array([0, 0, 2 * (high - low).max()])
     columns = Evaluator(model).geometry(x, eye=None if eye is None else np.asarray(eye, np.float32))
-    return collider_of_splats(*columns, making)
+    return collider_of_splats(*(columns if mend is None else mend(columns)), making)
 
 
 def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:

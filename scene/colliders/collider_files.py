@@ -1,7 +1,9 @@
 """The colliders that a scene file asks for: from mesh files or from the splats."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from shapeshift.runtime_models.model import BadFile, Model
 from shapeshift.scene.colliders.collider import (
@@ -11,6 +13,8 @@ from shapeshift.scene.colliders.collider import (
     collider_of_mesh,
     collider_of_model,
 )
+from shapeshift.scene.colliders.quick_ground import mended
+from shapeshift.scene.colliders.standing import Plane
 from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, SceneItem
 
 BACKGROUND_FACES = 10_000  # it stays where it is: the physics looks only at those near a body
@@ -44,13 +48,20 @@ def collider_key(item: SceneItem, model: Model) -> tuple:
     return (item.collider, item.name == BACKGROUND, *made_of)
 
 
-def one_collider(file: SceneFile, item: SceneItem, model: Model, making: Making) -> Collider:
-    """The object's collider; the background's is a mesh of more faces that leaves rooms open."""
+def one_collider(
+    file: SceneFile, item: SceneItem, model: Model, making: Making,
+    stood_on: Sequence[tuple[np.ndarray, Plane]] = (),
+) -> Collider:  # fmt: skip
+    """The object's collider; the background's is a mesh of more faces that leaves rooms open.
+
+    stood_on: corners (V, 3) metres, world, of things that stand on it, and the plane of each.
+    """
     if item.name == BACKGROUND:
         making = replace(making, hollow=True, faces=BACKGROUND_FACES)
     try:
         if item.collider == HULLS:
-            return collider_of_model(model, item.x, making)
+            mend = (lambda columns: mended(columns, item.pose, stood_on)) if stood_on else None
+            return collider_of_model(model, item.x, making, mend=mend)
         assert item.collider is not None, "asked of items that have one"
         return collider_of_mesh(file.path(item.collider), making)
     except BadFile as error:

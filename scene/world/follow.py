@@ -1,6 +1,6 @@
 """Makes a living world match an edited scene file: what was not edited goes on as it was."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
 from shapeshift.runtime_models.model import Model
@@ -13,6 +13,7 @@ from shapeshift.scene.document.scene_file import (
 )
 from shapeshift.scene.world.reactions import start
 from shapeshift.scene.world.rigid_object import RigidObject
+from shapeshift.scene.world.settle import is_still, let_down, shift_shape
 from shapeshift.scene.world.world import World
 
 BODY = (
@@ -41,15 +42,18 @@ def follow(world: World, file: SceneFile, models: Mapping[str, Model], colliders
     rename(world, wanted)
     for name in [name for name in world.objects if name not in wanted]:
         world.remove(name)
+    exact: list[str] = []  # that get their exact body now
     for label, item in labelled(file):
         if item.name not in world.objects:
             world.add(item, models[item.name], colliders.get(item.name), label)
         else:
-            change(world, item, models[item.name], colliders.get(item.name))
+            exact += change(world, item, models[item.name], colliders.get(item.name))
         obj = world.objects[item.name]
         if obj.drawn.label != label:
             world.objects[item.name] = replace(obj, drawn=replace(obj.drawn, label=label))
     world.objects = {name: world.objects[name] for name in wanted}
+    if exact:
+        seat(world, exact)
 
 
 def rename(world: World, wanted: Mapping[str, SceneItem]) -> None:
@@ -66,15 +70,17 @@ def rename(world: World, wanted: Mapping[str, SceneItem]) -> None:
                 world.names[obj.body] = item.name
 
 
-def change(world: World, item: SceneItem, model: Model, collider) -> None:
-    """One object becomes what its item says now."""
+def change(world: World, item: SceneItem, model: Model, collider) -> list[str]:
+    """One object becomes what its item says now; its name where it got another body meanwhile."""
     old = world.objects[item.name]
     new = changed(old.item, item)
+    exact: list[str] = []
     if old.collider is not None and collider is not None and collider is not old.collider:
         if not new & set(BODY):
             other_pieces(world, old, model, collider)
+            exact.append(item.name)
     if not new:
-        return
+        return exact
     label = world.objects[item.name].drawn.label
     if new & set(BODY):
         stand_in(world, world.objects[item.name], item, model, collider)
@@ -93,6 +99,29 @@ def change(world: World, item: SceneItem, model: Model, collider) -> None:
     if "visible" in new:
         world.show(item.name, item.visible)
     world.objects[item.name] = replace(world.objects[item.name], item=item)
+    return exact
+
+
+def seat(world: World, names: Sequence[str]) -> None:
+    """Nothing that is at rest jumps when these objects get exact bodies: where a thing would lie
+    on them its body lies now, and the thing stays where it is seen.
+
+    What would move farther than a thing that is put down does falls, as it does in truth.
+    """
+    physics = world.physics
+    ground = any(not world.objects[name].moves for name in names)  # then it is everything's
+    still = [
+        obj
+        for name, obj in world.objects.items()
+        if (ground or name in names) and obj.moves and is_still(physics, obj.body_id)
+    ]
+    if not still:
+        return
+    ends = let_down(physics)
+    for obj in still:
+        motion = ends.get(obj.body_id)
+        if motion is not None and motion.is_put:
+            shift_shape(physics, obj.body_id, motion.pose)
 
 
 def stand_in(world: World, old: RigidObject, item: SceneItem, model: Model, collider) -> None:

@@ -1,6 +1,7 @@
 """What enters the physics, checked at its door, and the engine's shapes of it."""
 
 import math
+from collections.abc import Iterable
 from types import ModuleType
 from typing import Any
 
@@ -209,9 +210,13 @@ def end_floats(bodies: dict[int, Any], held: set[int]) -> None:
     for number, body in bodies.items():
         if body.gravity_scale == 0:
             v, w = body.linvel, body.angvel
-            still = math.hypot(v.x, v.y, v.z) < STIRS and math.hypot(w.x, w.y, w.z) < TURNS
-            if number in held or not still:
+            if number in held or not is_slow((v.x, v.y, v.z), (w.x, w.y, w.z)):
                 body.gravity_scale, body.linear_damping, body.angular_damping = 1.0, 0.0, 0.0
+
+
+def is_slow(line: Iterable[float], turn: Iterable[float]) -> bool:
+    """m/s and rad/s of what nothing has touched."""
+    return math.hypot(*line) < STIRS and math.hypot(*turn) < TURNS
 
 
 def more_substeps(speeds: dict[int, tuple[float, float, float]], pressed: bool) -> int:
@@ -263,9 +268,10 @@ def broad_faces(points: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     total = np.bincount(face, areas)
     found = []
     for number in np.argsort(-total, kind="stable"):
+        if not total[number] >= BROAD * total.sum():
+            break
         triangles = np.flatnonzero(face == number)
-        many = corner_count(hull.simplices[triangles]) > MOST_CORNERS
-        if many and total[number] >= BROAD * total.sum():
+        if corner_count(hull.simplices[triangles]) > MOST_CORNERS:
             normal = areas[triangles] @ hull.equations[triangles, :3]
             rows = np.unique(hull.simplices[triangles])
             found.append((rows, normal / np.linalg.norm(normal)))
@@ -329,10 +335,12 @@ def rim_of(faces: np.ndarray, count: int) -> np.ndarray | None:
     None where two go along one in the same way.  count: of the vertices.
     """
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])  # (3F, 2)
-    code = edges[:, 0] * count + edges[:, 1]
-    if len(np.unique(code)) < len(code):
+    code, back = edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0]
+    ordered = np.sort(code)
+    if (ordered[1:] == ordered[:-1]).any():
         return None
-    return edges[~np.isin(code, edges[:, 1] * count + edges[:, 0])]
+    at = np.searchsorted(ordered, back).clip(max=len(ordered) - 1)
+    return edges[ordered[at] != back]
 
 
 def thickened(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:

@@ -4,7 +4,7 @@ All of it is tried in a copy of the physics; the caller takes over the poses tha
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from shapeshift.runtime_models.model import BadFile, Finding
 from shapeshift.scene.pose import Pose
 from shapeshift.scene.world.physics import Physics
+from shapeshift.scene.world.physics_shapes import is_slow, isometry, pose_of
 from shapeshift.scene.world.world import FLOOR_NAME, World
 
 TOUCHING_M = 2e-4  # metres: as deep as this things lie in each other, and the engine holds them so
@@ -20,6 +21,7 @@ PUSHES = 90  # steps in which that has to be done
 PUSH = 0.01  # of the smallest thing's side: the most that a step pushes
 
 PUT_DOWN_S, REST_S = 1.0, 3.0  # seconds: until a thing lies on what carries it, and of the test
+LET_DOWN_S = 0.5  # the same, of what lay on nearly the same before
 DAMPING = 4.0  # 1/s, while it is put down: it neither bounces nor rolls off
 MOST_GAP = 0.05  # of its size: from a thing to what carries it; above, nothing does
 MOST_PUT = 5.0  # degrees that it may turn while it is put down
@@ -183,6 +185,34 @@ def let_fall(physics: Physics, seconds: float, damping: float = 0.0) -> dict[int
             float(np.ptp(boxes[number], axis=0).max()), left_s[number], on.get(number),
         )  # fmt: skip
     return found
+
+
+def let_down(physics: Physics) -> dict[int, BodyMotion]:
+    """How each body comes to rest from here: out of what it is inside of, then gently down."""
+    copy = copy_of(physics)
+    starts = {number: physics.pose(number) for number in physics.bodies()}
+    boxes = {number: box_of(physics, number) for number in starts}
+    for number, pose in push_apart(physics)[0].items():
+        copy.set_pose(number, pose)
+    found = let_fall(copy, LET_DOWN_S, DAMPING)
+    for number, motion in found.items():
+        way, turned = stirred(starts[number], motion.pose, boxes[number])
+        found[number] = replace(motion, moved_m=float(np.linalg.norm(way)), turned=turned)
+    return found
+
+
+def is_still(physics: Physics, number: int) -> bool:
+    """Whether a body is at rest, or as good as."""
+    line, turn = physics.velocity(number)
+    return is_slow(line, turn)
+
+
+def shift_shape(physics: Physics, number: int, pose: Pose) -> None:
+    """Has a body's shape where it would be at that pose, while the body stays where it is."""
+    here = np.linalg.inv(physics.pose(number).matrix())
+    collider = physics.engine.colliders[physics.engine_body(number).colliders[0]]
+    now = pose_of(collider.position_wrt_parent).matrix()
+    collider.position_wrt_parent = isometry(Pose.from_matrix(here @ pose.matrix() @ now))
 
 
 def stirred(start: Pose, now: Pose, box: np.ndarray) -> tuple[np.ndarray, float]:

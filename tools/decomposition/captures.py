@@ -33,7 +33,6 @@ from shapeshift.decomposition.assemble import (  # noqa: E402
     Collider,
     choose_proxy,
     most_of,
-    pressed,
     standing_mesh,
 )
 from shapeshift.decomposition.completion.complete import complete  # noqa: E402
@@ -70,6 +69,7 @@ from shapeshift.scene.colliders.collider import Making  # noqa: E402
 from shapeshift.scene.colliders.collider_pieces import hull_faces  # noqa: E402
 from shapeshift.scene.colliders.convex_parts import cut_into_parts, hull_volume  # noqa: E402
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape  # noqa: E402
+from shapeshift.scene.colliders.standing import pressed  # noqa: E402
 from tools.decomposition.published_masks import prepare  # noqa: E402
 from tools.decomposition.segmenters import iou  # noqa: E402
 from tools.decomposition.surface_scores import (  # noqa: E402

@@ -338,12 +338,16 @@ def stands_elsewhere(state: EditorState) -> bool:
     """Whether anything is not where it starts, or at another x."""
     items = {item.name: item for item in state.edited.file.all_items}
     for obj in state.scene.objects:
-        item, pose = items[obj.name], obj.world_from_object
-        if obj.x != item.x or math.dist(pose.position, item.position) > MOVED_M:
-            return True
-        if abs(sum(a * b for a, b in zip(pose.wxyz, item.wxyz, strict=True))) < 1 - TURNED:
+        if obj.x != items[obj.name].x or stands_elsewhere_at(obj, items[obj.name]):
             return True
     return False
+
+
+def stands_elsewhere_at(obj: SceneObject, item: SceneItem) -> bool:
+    """Whether one object is not where it starts."""
+    pose = obj.world_from_object
+    alike = abs(sum(a * b for a, b in zip(pose.wxyz, item.wxyz, strict=True)))
+    return math.dist(pose.position, item.position) > MOVED_M or bool(alike < 1 - TURNED)
 
 
 def poll_bodies(state: EditorState) -> bool:

@@ -1,14 +1,17 @@
 """The world behind the window: colliders of the document's objects, made in a thread, then bodies.
 
 The picture does not wait for it: a scene is there to be seen before it can be touched.  Objects are
-touched as rough hulls first, and by their exact pieces when those are made.
+touched as rough hulls first, on a rough ground of what is near them, and by their exact pieces, on
+the exact one, when those are made.
 """
 
 import threading
 from collections.abc import Mapping
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from shapeshift.app.editor.state.files.edited_file import EditedFile, ModelKey, key_of
 from shapeshift.app.editor.state.files.opened import Progress
@@ -19,6 +22,7 @@ from shapeshift.scene.document.scene_file import BACKGROUND, HULLS, SceneFile, S
 
 if TYPE_CHECKING:
     from shapeshift.scene.colliders.collider import Collider
+    from shapeshift.scene.colliders.standing import Plane
     from shapeshift.scene.world.world import World
 
 PATIENCE_S = 3.0  # longest wait at the end for a collider that is being made
@@ -38,9 +42,11 @@ class Bodies:
         self.notes: list[str] = []  # what the physics has changed on the way in
         self._of: dict[str, tuple[tuple, Collider]] = {}  # name -> what it was made of, and it
         self._made: dict[tuple, Collider | None] = {}  # of a mesh or model; None: there is none
+        self._stands: dict[str, Stood] = {}  # by name: where things stood, and on what
         self._ground: tuple = ()  # floor and gravity of the world
         self._future: Future | None = None
         self.stale = True  # the world does not know of the last edits yet
+        self._due = False  # a frame more is wanted
         self._told: set[str] = set()  # notes of this scene
         self.why_none = ""  # the problem that left nothing to be touched; "": none did
         self._given_up = False  # there can be no world: the scene is there to be seen and edited
@@ -111,25 +117,29 @@ class Bodies:
         """Once a frame; True while colliders are being made."""
         if self._future is not None and self._future.done():
             future, self._future = self._future, None
-            key, made, problem, rough = future.result()
-            self._exchange(key, made, rough)
-            self.problem = problem or self.problem
-            self.why_none = problem or self.why_none
+            done: Done = future.result()
+            self._exchange(done)
+            self.problem = done.problem or self.problem
+            self.why_none = done.problem or self.why_none
         try:
             self._catch_up(edited)
         except BadFile as error:
             self.problem, self.stale = str(error), False
             self.why_none, self._given_up = self.problem, self.world is None
-        return self.busy
+        return self.busy or self._due
 
-    def _exchange(self, key: tuple, made: "Collider | None", rough: "Collider | None") -> None:
+    def _exchange(self, done: "Done") -> None:
         """A collider, in the place of the rough one that stood in for it."""
-        self._made[key] = made
+        self._made[done.key] = done.collider
         for name, (made_of_it, before) in self._of.items():
-            if rough is not None and before is rough and made is not None:
-                self._of[name], self.stale = (made_of_it, made), True
+            if done.rough is not None and before is done.rough and done.collider is not None:
+                self._of[name], self.stale = (made_of_it, done.collider), True
+        for key, collider in done.pressed.items():
+            self._made[key] = collider
+        self._stands.update(done.stands)
 
     def _catch_up(self, edited: EditedFile) -> None:
+        self._due = False
         if self.busy or self._given_up:
             return
         file = edited.file
@@ -141,9 +151,12 @@ class Bodies:
                 self._start(edited, missing[0], None)
                 return
             self._bring_up_to_date(file, edited, touched)
+            self._due = self.world is not None  # exact bodies are begun on in the next frame
+            return
         if self.world is not None and not self.stale:
             found = ((item, self._collider(item)) for item in touched)
             rough = [(item, made) for item, made in found if made is not None and made.rough]
+            rough.sort(key=lambda pair: pair[0].name == BACKGROUND)
             if rough:
                 self._start(edited, *rough[0])
 
@@ -211,6 +224,8 @@ class Bodies:
             if rough is not None and made is rough and item.collider == HULLS:
                 item = replace(item, x=key[-1])  # of the shape that the rough one has
         self._making = (said("{name}: making a collider", name=item.name), 0.0)
+        things = self._things(file) if rough is None and item.name == BACKGROUND else {}
+        stands = self._stands
 
         def report(what: str, part: float) -> None:
             if unwanted.is_set():
@@ -219,7 +234,10 @@ class Bodies:
 
         def work() -> None:
             try:
-                future.set_result((making_of(item), *make(file, item, model, report, rough), rough))
+                done = None
+                if things and item.collider == HULLS:
+                    done = ground_at_once(item, model, things)
+                future.set_result(done or make(file, item, model, report, rough, stands))
             except Unwanted:
                 future.cancel()
             except BaseException as error:  # handed to the window's thread, which raises it again
@@ -227,6 +245,34 @@ class Bodies:
 
         self._thread = threading.Thread(target=work, name="colliders", daemon=True)
         self._thread.start()
+
+    def _things(self, file: SceneFile) -> "dict[str, tuple[SceneItem, Collider]]":
+        """What moves and has a collider, by name."""
+        found = ((item, self._collider(item)) for item in file.items if not item.static)
+        return {item.name: (item, made) for item, made in found if made is not None}
+
+
+@dataclass(frozen=True)
+class Stood:
+    """How a thing stood when its ground was made."""
+
+    world_from_object: np.ndarray  # (4, 4)
+    corners: np.ndarray  # (V, 3) metres, world
+    plane: "Plane"
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a thread has made."""
+
+    key: tuple
+    collider: "Collider | None"  # None: there is none
+    problem: str = ""  # one sentence, why; or why it is a rough one
+    rough: "Collider | None" = None  # in whose place it comes
+    stands: "Mapping[str, Stood]" = field(default_factory=dict)
+    pressed: "Mapping[tuple, Collider]" = field(
+        default_factory=dict
+    )  # rough ones, onto their plane
 
 
 class Unwanted(Exception):
@@ -244,17 +290,56 @@ def making_of(item: SceneItem) -> tuple:
 
 
 def make(
-    file: SceneFile, item: SceneItem, model: Model, report: Progress, rough: "Collider | None"
-) -> "tuple[Collider | None, str]":
-    """The rough collider, with one the exact; or None, with one that one, and why."""
+    file: SceneFile, item: SceneItem, model: Model, report: Progress, rough: "Collider | None",
+    stands: "Mapping[str, Stood] | None" = None,
+) -> Done:  # fmt: skip
+    """The rough collider, with one the exact; or None, with one that one, and why.
+
+    stands: how things stood, by name.
+    """
     from shapeshift.scene.colliders.collider import Making
     from shapeshift.scene.colliders.collider_files import one_collider
+    from shapeshift.scene.colliders.quick_ground import stood
 
     rest = "It cannot be touched." if rough is None else "It is touched as one hull."
     instead = rough and replace(rough, rough=False)  # is not tried again
+    key, problem, stands = making_of(item), "", stands or {}
+    on_it = [(one.corners, one.plane) for one in stands.values() if item.name == BACKGROUND]
+    making = Making(progress=report, rough=rough is None)
     try:
-        return one_collider(file, item, model, Making(progress=report, rough=rough is None)), ""
+        made = one_collider(file, item, model, making, on_it)
+        if item.name in stands and item.collider == HULLS:
+            stand = stands[item.name]
+            made = stood(made, stand.world_from_object, stand.plane)
     except BadFile as error:
-        return instead, f"{error} {rest}"
+        made, problem = instead, f"{error} {rest}"
     except MemoryError:
-        return instead, f"'{item.name}' needs more memory for its collider than there is. {rest}"
+        made = instead
+        problem = f"'{item.name}' needs more memory for its collider than there is. {rest}"
+    return Done(key, made, problem, rough)
+
+
+def ground_at_once(
+    item: SceneItem, model: Model, things: "Mapping[str, tuple[SceneItem, Collider]]"
+) -> Done | None:
+    """A background's rough collider, and things that stand on it, pressed onto it; None: there is
+    none that is quick.
+    """
+    from shapeshift.scene.colliders.quick_ground import ground_of_model, stood
+
+    stands: dict[str, Stood] = {}
+    poses = {name: thing.pose.matrix() for name, (thing, _) in things.items()}
+    corners = {
+        name: np.concatenate(made.parts) @ poses[name][:3, :3].T + poses[name][:3, 3]
+        for name, (_, made) in things.items()
+    }
+    collider, found = ground_of_model(model, item.x, item.pose, list(corners.values()))
+    if collider is None:
+        return None
+    rough: dict[tuple, Collider] = {}
+    for (name, (thing, made)), plane in zip(things.items(), found, strict=True):
+        if plane is not None:
+            stands[name] = Stood(poses[name], corners[name], plane)
+            if made.rough:
+                rough[making_of(thing)] = stood(made, poses[name], plane)
+    return Done(making_of(item), collider, stands=stands, pressed=rough)

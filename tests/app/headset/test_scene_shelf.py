@@ -136,7 +136,7 @@ def test_work_is_not_lost_by_one_press(ctx):
     objects = ObjectEdits(wearer.editor, None, lambda: None)
     objects.change(wearer.editor.edited.file.items[0], "mass", mass_kg=2.0)
     wearer.press("The demo")
-    assert opened == [TOUCH] and "lose" in wearer.editor.messages.note
+    assert opened == [TOUCH] and "not saved" in wearer.editor.messages.note
     wearer.press("The demo")
     assert opened == [TOUCH, TOUCH]
     picture.release()

@@ -5,18 +5,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from shapeshift.decomposition.assemble import (
-    LEANS,
-    MOST_PRESSED,
-    PIECES,
-    SNAP,
-    Proxy,
-    choose_proxy,
-    middle_of,
-    pressed,
-    proxies_apart,
-    stands,
-)
+from shapeshift.decomposition.assemble import PIECES, Proxy, choose_proxy, proxies_apart
 from shapeshift.decomposition.completion.plane import Plane
 from shapeshift.decomposition.partition import LabelledView
 from shapeshift.decomposition.proxies.ground import (
@@ -37,6 +26,14 @@ from shapeshift.scene.colliders.carve import SeenDepth
 from shapeshift.scene.colliders.collider import Collider, box_around
 from shapeshift.scene.colliders.collider_wrap import is_watertight, join_meshes, volume
 from shapeshift.scene.colliders.primitives import SHAPES, collider_of_shape
+from shapeshift.scene.colliders.standing import (
+    LEANS,
+    MOST_PRESSED,
+    SNAP,
+    middle_of,
+    pressed,
+    stands,
+)
 from shapeshift.scene.pose import View, look_at, perspective
 from shapeshift.scene.world.physics_shapes import mesh_shape
 from tests.support.scene.physics_things import BOX_FACES, box

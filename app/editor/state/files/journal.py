@@ -6,7 +6,7 @@ once, a drag twice a second.  The next start offers it; saving or refusing all r
 
 import hashlib
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from shapeshift.app.editor.state.files.saving import unsaved
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.paths import file_name
 from shapeshift.scene.document.edits import History, HistoryStep
+from shapeshift.scene.document.scene_file import SceneFile
 
 DRAG_S = 0.4  # between two entries of one drag
 RETRY_S = 2.0  # between two trials to write where that was refused
@@ -33,8 +34,15 @@ STEM = 40  # letters of a scene's name in that of its file
 class Journal:
     """Follows the history of a state; `words` say why nothing is kept, "": all is."""
 
-    def __init__(self, state: EditorState, folder: Path) -> None:
-        self._state, self.folder = state, folder
+    def __init__(
+        self, state: EditorState, folder: Path,
+        stands: Callable[[], SceneFile | None] = lambda: None,
+    ) -> None:  # fmt: skip
+        """stands: the scene as it stands, where hands have moved things that no edit did; the same
+        object until they move again.
+        """
+        self._state, self.folder, self._stands = state, folder, stands
+        self._stood: tuple[History, SceneFile, History] | None = None
         self.words = ""
         self.file: JournalFile | None = None
         self._left: list[JournalFile] = []  # that could not be written any more, until one can
@@ -58,10 +66,26 @@ class Journal:
         self._stem = stem_of(self._state)
         self._refused = None
 
+    def _history(self) -> History:
+        """What is kept: the history, and one step more for what hands have moved."""
+        history, file = self._state.edited.history, self._stands()
+        if file is None:
+            self._stood = None
+            return history
+        known = self._stood
+        if known is None or known[0] is not history or known[1] is not file:
+            known = (history, file, history.record(file, "keep as it stands"))
+            self._stood = known
+        return known[2]
+
+    @property
+    def _unsaved(self) -> bool:
+        return self._stood is not None or unsaved(self._state)
+
     def begin_saving(self, files: Mapping[Path, bytes]) -> None:
         """What is about to be written: after a kill amid that it is known as this window's."""
-        history = self._state.edited.history
-        if history is self._refused or not unsaved(self._state):
+        history = self._history()
+        if history is self._refused or not self._unsaved:
             return
         try:
             if history is not self._seen:
@@ -75,12 +99,13 @@ class Journal:
 
     def refuse(self) -> None:
         """Nobody wants to save what there is now."""
-        self._refused = self._state.edited.history
+        self._refused = self._history()
         self._remove()
 
     def close(self) -> None:
         """The window goes: what is neither saved nor refused is offered at the next start."""
-        if not unsaved(self._state) or self._refused is self._state.edited.history:
+        history = self._history()
+        if not self._unsaved or self._refused is history:
             self._remove()
         for file in (self.file, *self._left):
             if file is not None:
@@ -96,8 +121,8 @@ class Journal:
 
     def follow(self, now_s: float) -> bool:
         """Writes what was edited since the last call; True while a drag waits to be written."""
-        state, history = self._state, self._state.edited.history
-        if not unsaved(state):
+        history = self._history()
+        if not self._unsaved:
             if self.file is not None or self._left:
                 self._remove()
             self.words, self._seen = "", None

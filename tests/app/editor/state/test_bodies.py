@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapeshift.app.editor.state import bodies as bodies_module
 from shapeshift.app.editor.state.bodies import Bodies
 from shapeshift.app.editor.state.files.edited_file import EditedFile, key_of
 from shapeshift.app.editor.state.files.opened import Source
@@ -52,7 +53,7 @@ def made(monkeypatch) -> list:
     """What was asked for, (name, x); it is there at once, as one that was made before."""
     asked = []
 
-    def one_collider(file, item, model, making):
+    def one_collider(file, item, model, making, stood_on=()):
         assert making.rough
         asked.append((item.name, item.x))
         if item.name == "bad":
@@ -80,7 +81,8 @@ def test_one_collider_serves_all_that_are_alike(made):
     assert [objects[name].body is not None for name in objects] == [True, True, True, False]
 
 
-def test_a_background_s_is_another_than_an_object_s(made):
+def test_a_background_s_is_another_than_an_object_s(made, monkeypatch):
+    monkeypatch.setattr(bodies_module, "ground_at_once", lambda *_: None)  # nothing solid is near
     bodies, of = Bodies(), edited(obj("a"))
     background = obj("background", collider=HULLS)
     file = replace(of.file, background=replace(background, static=True))
@@ -136,7 +138,7 @@ def test_rough_hulls_come_first_and_exact_pieces_in_their_place(monkeypatch):
     """In motion, held by nobody, at the x of then; the one that cannot be cut keeps its hull."""
     asked, cut = [], threading.Event()
 
-    def one_collider(file, item, model, making):
+    def one_collider(file, item, model, making, stood_on=()):
         asked.append((item.name, making.rough, item.x))
         if making.rough:
             return cube(True)
@@ -148,8 +150,8 @@ def test_rough_hulls_come_first_and_exact_pieces_in_their_place(monkeypatch):
     monkeypatch.setattr(collider_files, "one_collider", one_collider)
     bodies, of = Bodies(), edited(obj("a"), obj("bad", x=0.5))
     end = time.monotonic() + 30
-    while bodies.world is None and time.monotonic() < end:
-        bodies.poll(of)
+    while not (bodies.world and bodies.busy) and time.monotonic() < end:
+        assert bodies.poll(of)
         time.sleep(0.001)
     world = bodies.living
     assert bodies.busy and all(each.collider.rough for each in world.objects.values())
@@ -186,7 +188,7 @@ def test_rough_hulls_come_first_and_exact_pieces_in_their_place(monkeypatch):
 def test_another_scene_ends_what_is_being_made(monkeypatch):
     begun, ended = threading.Event(), threading.Event()
 
-    def one_collider(file, item, model, making):
+    def one_collider(file, item, model, making, stood_on=()):
         try:
             while True:
                 begun.set()
