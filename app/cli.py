@@ -212,7 +212,7 @@ def choose(arguments: list[str]) -> tuple[str, list[str]]:
     """The command and its own arguments; no command means the viewer or its stand-in."""
     if arguments and arguments[0] in COMMANDS:
         return arguments[0], arguments[1:]
-    if not arguments and not has_display():
+    if not arguments and not has_display() and not sys.stderr.isatty():
         say("No display here: drawing the demo without a window.")
         return "headless", []
     return "view", arguments
@@ -277,8 +277,12 @@ def run_command(command: str, arguments: list[str]) -> int:
         defaults = module.defaults() if hasattr(module, "defaults") else {}
         print_text(help_text(module.Options, prog, defaults))
         return 0
-    options = begin_at_start(parse(module.Options, arguments, prog))
+    options: Any = begin_at_start(parse(module.Options, arguments, prog))
     settle_caches_for(command)
+    if command == "view":
+        from shapeshift.app.page.serve import view
+
+        return view(options, has_display(), importing)
     with importing():
         module = importlib.import_module(f"shapeshift.app.{own}")
     if command in OPEN_ENDED:

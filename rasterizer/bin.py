@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 KERNELS = Path(__file__).parent / "kernels"
 GROUP = 256  # work-items, as in sort_gpu.cl
 SPAN = 2048  # keys a work-group
-DIGIT_BITS = 4
+DIGIT_BITS = 8
 
 
 def prefix_sums(device: Device, data: "Array") -> None:
@@ -33,20 +33,22 @@ def prefix_sums(device: Device, data: "Array") -> None:
         device.launch(kernels["add_sums"], count, GROUP, count, data, sums)
 
 
-def sort_pairs(device: Device, keys: "Array", values: "Array", bits: int) -> tuple:
-    """(keys, values) by the lowest `bits` of uint32 keys, stable; the inputs may be overwritten."""
+def sort_pairs(device: Device, keys: "Array", values: "Array", bits: int, base: int = 0) -> tuple:
+    """(keys, values) by the lowest `bits` of uint32 keys less `base`, stable; the inputs may be
+    overwritten.
+    """
     kernels = device.program(KERNELS / "sort_gpu.cl")
     count = keys.size
     groups = -(-count // SPAN)
     spare_keys, spare_values = device.empty(count, np.uint32), device.empty(count, np.int32)
-    table = device.empty((1 << DIGIT_BITS, groups), np.int32)
+    table, totals = device.empty((GROUP, groups), np.int32), device.empty(GROUP, np.int32)
     for shift in range(0, bits if count else 0, DIGIT_BITS):
-        shared = (count, groups, shift, keys)
+        shared = (count, groups, np.uint32(base), shift, keys)
         device.launch(kernels["count_digits"], groups * GROUP, GROUP, *shared, table)
-        prefix_sums(device, table)
+        device.launch(kernels["scan_digits"], GROUP * GROUP, GROUP, groups, table, totals)
         device.launch(
             kernels["scatter_digits"], groups * GROUP, GROUP,
-            *shared, values, table, spare_keys, spare_values,
+            *shared, values, table, totals, spare_keys, spare_values,
         )  # fmt: skip
         keys, values, spare_keys, spare_values = spare_keys, spare_values, keys, values
     return keys, values
@@ -120,12 +122,10 @@ def sort_order(device: Device, scratch: TileScratch, form: str | None = None) ->
     """
     status = device.view(scratch.status)
     visible = int(status[:, 0].sum(dtype=np.int64))
+    ends = int(status[:, 2].min()), int(status[:, 3].max())
     if (form or device.kind) == "gpu":
-        return _sort_groups(device, scratch, visible)
-    kernels = device.program(KERNELS / "bin.cl")
-    return _sort(
-        device, kernels, scratch, visible, int(status[:, 2].min()), int(status[:, 3].max())
-    )
+        return _sort_groups(device, scratch, visible, *ends)
+    return _sort(device, device.program(KERNELS / "bin.cl"), scratch, visible, *ends)
 
 
 def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> Tiles:
@@ -156,16 +156,23 @@ def _bin_groups(device: Device, projected: Projected, grid: tuple[int, int]) -> 
     return Tiles(grid, starts, intersections, tile_bounds, order[:shown], slot_count, first_slot)
 
 
-def _sort_groups(device: Device, scratch: TileScratch, visible: int) -> "Array":
-    """The GPU form of sort_order: a radix sort of all places, the empty ones last."""
+def _sort_groups(
+    device: Device, scratch: TileScratch, visible: int, least: int, most: int
+) -> "Array":
+    """The GPU form of sort_order: a radix sort of all places by their keys, which are from least to
+    most; the empty ones last.
+    """
+    if visible == 0:
+        return device.empty(0, np.int32)
     assert scratch.pairs is not None, "an order from before needs no sort"
     kernels, count = device.program(KERNELS / "bin_gpu.cl"), scratch.pairs.shape[0]
     keys, splats = device.empty(count, np.uint32), device.empty(count, np.int32)
     device.launch(
         kernels["unpack_pairs"], count, 64,
-        count, scratch.chunk, scratch.status, scratch.pairs, keys, splats,
+        count, scratch.chunk, np.uint32(most + 1), scratch.status, scratch.pairs, keys, splats,
     )  # fmt: skip
-    return sort_pairs(device, keys, splats, 32)[1][:visible]
+    bits = (most + 1 - least).bit_length()
+    return sort_pairs(device, keys, splats, bits, least)[1][:visible]
 
 
 def _bin_ordered_groups(

@@ -28,11 +28,10 @@ SLOTS = {
     "COUNTS": 7,  # uint (20,)     as COUNTS below
     # sort
     "KEYS_OUT": 0,
-    "ORDER_IN": 1,
-    "ORDER_OUT": 2,
-    "HISTOGRAM": 3,  # uint (groups, RADIX)
+    "ORDER_SPARE": 2,  # uint (N,)      takes turns with ORDER
+    "HISTOGRAM": 3,  # uint (RADIX, groups + 1)
     "COMMAND": 4,  # uint (5,)      one indirect draw
-    "DISPATCH": 5,  # uint (3,)      work groups of the sort's passes after the first
+    "DISPATCH": 5,  # uint (21,)     work groups of the sort's passes after the first
     # splat
     "ORDER": 1,  # uint (N,)      indices, near to far
     # surface
@@ -75,14 +74,26 @@ COUNTS = {
 }
 COUNTS_SIZE = MOST_VIEWS * COUNTS_STRIDE + 4
 
+# The dispatch buffer: for each of three later passes of the sort its groups of keys, by 1 by 1, and
+# of digits, by 1 by 1, none where the pass is not needed; then what the shaders read.
+MOST_LATER = 3
+DISPATCH = {
+    "PASSES": 6 * MOST_LATER,  # in all, 1 to 4
+    "BASE": 6 * MOST_LATER + 1,  # what keys are counted from
+    "LATER": 6 * MOST_LATER + 2,  # groups of keys of a later pass
+}
+DISPATCH_SIZE = 6 * MOST_LATER + 3
+
 
 def defines() -> dict[str, object]:
     """What every shader is compiled with."""
     numbers: dict[str, object] = {
         "WORKGROUP": WORKGROUP, "DECODE_WORKGROUP": DECODE_WORKGROUP, "SORT_BLOCKS": SORT_BLOCKS,
-        "RADIX": RADIX, "CULLED_KEY": f"{CULLED_KEY:#x}u", "MAX_ALPHA": MAX_ALPHA,
-        "HALF_MAX": HALF_MAX, "WEIGHTS_BLOCK": WEIGHTS_BLOCK, "COUNTS_STRIDE": f"{COUNTS_STRIDE}u",
+        "RADIX": RADIX, "MOST_LATER": f"{MOST_LATER}u", "CULLED_KEY": f"{CULLED_KEY:#x}u",
+        "MAX_ALPHA": MAX_ALPHA, "HALF_MAX": HALF_MAX, "WEIGHTS_BLOCK": WEIGHTS_BLOCK,
+        "COUNTS_STRIDE": f"{COUNTS_STRIDE}u",
     }  # fmt: skip
     slots = {f"SLOT_{name}": slot for name, slot in SLOTS.items()}
     counts = {f"COUNT_{name}": f"{row}u" for name, row in COUNTS.items()}
-    return numbers | slots | counts
+    dispatch = {f"DISPATCH_{name}": f"{row}u" for name, row in DISPATCH.items()}
+    return numbers | slots | counts | dispatch

@@ -15,7 +15,7 @@ from shapeshift.scene.document.scene_file import first_view
 from shapeshift.scene.world.read_script import read_script
 
 SCENE, SCRIPT = TOUCH, TOUCH.with_name("demo.jsonl")
-MOMENTS_S = (0.0, 1.0, 1.5, 3.0)  # all at rest; the mug carried; in the air; afterwards
+MOMENTS_S = (0.0, 1.0, 1.65, 3.0)  # all at rest; the mug carried; in the air; afterwards
 STEPS = 2  # of 1/90 s, a frame
 
 

@@ -49,6 +49,9 @@ class Options(DrawingOptions):
     pictures: Path | None = None
     """Folder for the pictures that F12 saves and the views that K keeps; scenes and exports go
     beside it.  Default: Shapeshift/pictures among your documents."""
+    browser: bool = False
+    """Show it as a page in this computer's browser in place of a window, as happens by itself where
+    there is no OpenGL 4.3."""
     panel: bool = True
     """Show the panel over the picture; H switches it."""
     target_ms: Annotated[float | None, EXPERT] = None

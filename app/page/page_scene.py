@@ -29,6 +29,7 @@ from shapeshift.runtime_models.web.web_model import (
 from shapeshift.scene.appearance import plain_color
 from shapeshift.scene.cameras.framing import model_points
 from shapeshift.scene.document.scene_file import SceneItem, named_stops
+from shapeshift.scene.pose import Pose
 from shapeshift.scene.scene import Scene, SceneObject
 from shapeshift.scene.selectors.selector import Box, HalfSpace, Lens, Painted, Selector
 
@@ -208,6 +209,16 @@ def described(
         describe_model(out, sample(model, every), every**0.5 if every > 1 else 1.0)
         for model in models
     ]
+    objects = [
+        object_entry(
+            obj, items.get(obj.name), number[id(obj.model)], pictures,
+            [region_entry(out, obj, selector, every) for selector in obj.selectors],
+        )
+        for obj in document.scene.objects
+    ]  # fmt: skip
+    for obj, place in zip(document.scene.objects, objects, strict=True):
+        if obj.label == 0 and place["solid"]:
+            cut_to_ground(place, [entry for entry in objects if entry["movable"]])
     return {
         "format": FORMAT,
         "title": settings.title,
@@ -220,13 +231,7 @@ def described(
         "gravity": document.file.gravity_m_s2 if document.file else 9.81,
         "floorY": document.floor_y,
         "models": entries,
-        "objects": [
-            object_entry(
-                obj, items.get(obj.name), number[id(obj.model)], pictures,
-                [region_entry(out, obj, selector, every) for selector in obj.selectors],
-            )
-            for obj in document.scene.objects
-        ],
+        "objects": objects,
         "palettes": palettes_of(out, models),
     }  # fmt: skip
 
@@ -281,6 +286,29 @@ def object_entry(
         "restitution": item.restitution if item else 0.0, "states": states,
         "regions": regions,
     }  # fmt: skip
+
+
+def cut_to_ground(place: ObjectEntry, things: list[ObjectEntry]) -> None:
+    """Leaves of the box of an upright bench or room what lies under the things that begin in it.
+
+    The page has boxes alone: things would rest on its top, or fall through.
+    """
+    if abs(place["wxyz"][0]) < 1 - 1e-6:
+        return
+    position, centre, half = (np.array(place[key]) for key in ("position", "centre", "half"))
+    bottoms = []
+    for thing in things:
+        world_from_thing = Pose(np.array(thing["position"]), np.array(thing["wxyz"])).matrix()
+        middle = world_from_thing[:3, :3] @ thing["centre"] + world_from_thing[:3, 3]
+        if (np.abs(middle - position - centre) < half).all():
+            sides = np.abs(world_from_thing[:3, :3]) @ thing["half"]
+            bottoms.append(float(middle[1] - sides[1] - position[1]))
+    low = centre[1] - half[1]
+    if bottoms and low < min(bottoms):
+        top = min(bottoms)
+        place["centre"], place["half"] = list(place["centre"]), list(place["half"])
+        place["centre"][1], place["half"][1] = (low + top) / 2, (top - low) / 2
+        place["radius"] += float(centre[1] - place["centre"][1])  # still around all of it
 
 
 def region_entry(out: Container, obj: SceneObject, selector: Selector, every: int) -> RegionEntry:

@@ -7,19 +7,27 @@ import secrets
 import sys
 import threading
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 from urllib.parse import urlsplit
 
-from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL
+from shapeshift.app.command_line import CONTROL, EXPERT, POSITIONAL, arguments_of
 from shapeshift.app.errors import UsageError
 from shapeshift.app.opening import PATIENCE_S, ReadingOptions, progress_after
+from shapeshift.app.paths import TOUCH, plain
 from shapeshift.app.terminal import say
 
 if TYPE_CHECKING:
-    from shapeshift.app.document import Document
+    from webbrowser import BaseBrowser
 
+    from shapeshift.app.document import Document
+    from shapeshift.app.editor.options import Options as ViewOptions
+
+ALONE = "Only this computer reaches it, and only with this address.  Ctrl-C ends it."
+PORTS = 20  # that are tried before any that is free
 LOOK_S = 0.5  # how often the file is looked at
 
 
@@ -175,14 +183,131 @@ def run(options: Options) -> int:
         f"{options.scene.name} is at {server.address}",
         f"A headset on USB: adb reverse tcp:{server.port} tcp:{server.port}, and in its browser "
         f"{server.address.replace('127.0.0.1', 'localhost')}",
-        "Only this computer reaches it, and only with this address.  Ctrl-C ends it.",
+        ALONE,
     )
+    return serve(options, server)
+
+
+def serve(options: Options, server: PageServer, opened: Callable[[], None] = lambda: None) -> int:
+    """Answers until somebody interrupts it; `opened` is called when it does."""
     try:
         with server:
+            opened()
             follow(options, server)
     except KeyboardInterrupt:
         say("Ended.")
     return 0
+
+
+# The page in place of the window: `view` where there is no OpenGL 4.3, and `view --browser`.
+
+IN_TERMINAL = ("www-browser", "links", "elinks", "lynx", "w3m")  # browsers that draw no page
+TAKEN_OVER = ("scenes", "x")  # of view's options; those of reading, too
+OF_THE_WINDOW = ("browser", "panel", "pictures")  # options that a page has no use for
+
+
+def view(
+    options: "ViewOptions", display: bool, importing: Callable[[], AbstractContextManager[None]]
+) -> int:
+    """In a window; where there can be none, or a browser was asked for, as a page in it.
+
+    importing: what the window's modules are imported in.
+    """
+    asked = "A browser was asked for." if options.browser else ""
+    if why := asked or ("" if display else "No display here."):
+        code = view_in_browser(options, why, display)
+        if code is not None:
+            return code
+    with importing():
+        from shapeshift.app.editor import desktop
+        from shapeshift.renderer.gl.context import NoContext
+    try:
+        return desktop.run(options)
+    except NoContext as error:
+        why = f"No window here: {str(error).partition(';')[0]}."
+        code = view_in_browser(options, why, display and is_display_there())
+        if code is None:
+            raise
+        return code
+
+
+def is_display_there() -> bool:
+    """Whether the display that is named is there: where it is not, browsers have none either."""
+    import warnings
+
+    import glfw
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # pyGLFW reports through warnings
+        return bool(glfw.init())
+
+
+def view_in_browser(options: "ViewOptions", why: str, display: bool) -> int | None:
+    """The exit code of the page; None: nobody would see it, without a browser or a terminal."""
+    if options.screenshot is not None:
+        return None
+    browser = find_browser() if display else None
+    if not (options.browser or browser or sys.stderr.isatty()):
+        return None
+    return browse(options, why, browser)
+
+
+def browse(view: "ViewOptions", why: str, browser: "BaseBrowser | None") -> int:
+    """Serves what `view` was asked to show, and opens it in a browser; why: there is no window.
+
+    Without a browser the address is for one elsewhere, by a tunnel.  Raises UsageError, BadFile.
+    """
+    scenes = list(view.scenes) or [TOUCH]
+    if len(scenes) > 1:
+        raise UsageError(f"{why} The page shows one scene; name one of the {len(scenes)}.")
+    reading = {each.name: getattr(view, each.name) for each in fields(ReadingOptions)}
+    options = Options(plain(scenes[0]), x=view.x, **reading)
+    kept = {*reading, *TAKEN_OVER, *OF_THE_WINDOW}
+    left = [a.name for a in arguments_of(type(view)) if a.field.name not in kept
+            and getattr(view, a.field.name) != a.field.default]  # fmt: skip
+    server = server_on_free_port(options.port)
+    say(f"{why} The page in a browser shows {options.scene.name} instead.")
+    if left:
+        say(f"It leaves out {', '.join(left)}, which the window has.")
+    server.files = page_files(options)
+
+    def tell_where() -> None:
+        if browser is not None and browser.open(server.address):
+            say(f"It opens in the browser: {server.address}")
+        else:
+            say(f"It is at {server.address}", tunnel_words(server.port))
+        say(ALONE)
+
+    return serve(options, server, tell_where)
+
+
+def find_browser() -> "BaseBrowser | None":
+    """The browser that this computer's user has chosen; None: none, or one that draws no page."""
+    import webbrowser
+
+    try:
+        found = webbrowser.get()
+    except webbrowser.Error:
+        return None
+    return None if os.path.basename(str(getattr(found, "name", ""))) in IN_TERMINAL else found
+
+
+def server_on_free_port(first: int) -> PageServer:
+    """On the first port, else one of the next, else on any that is free."""
+    for port in (*range(first, first + PORTS), 0):
+        try:
+            return PageServer(port)
+        except UsageError:
+            if port == 0:
+                raise
+    raise AssertionError("0 is any that is free")
+
+
+def tunnel_words(port: int) -> str:
+    """How another computer's browser reaches the page."""
+    to = (os.environ.get("SSH_CONNECTION") or "").split()
+    host = to[2] if len(to) == 4 else "THIS-COMPUTER"
+    return f"From another computer: `ssh -L {port}:{HERE}:{port} {host}`, then that address there."
 
 
 def follow(options: Options, server) -> None:

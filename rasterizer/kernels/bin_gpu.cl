@@ -24,14 +24,14 @@ __kernel void find_tile_bounds(int count, int tiles_x, int tiles_y, __global con
 }
 
 // Pairs of splat and key that every chunk has packed at its start -> keys and splats of all places,
-// ABSENT in the empty ones.  status: x: how many pairs a chunk has.
-__kernel void unpack_pairs(int count, int chunk, __global const uint4* status,
+// `absent` in the empty ones.  status: x: how many pairs a chunk has.
+__kernel void unpack_pairs(int count, int chunk, uint absent, __global const uint4* status,
                            __global const uint2* pairs, __global uint* keys,
                            __global int* splats) {
   const int i = get_global_id(0);
   if (i >= count) return;
   const bool here = i % chunk < (int)status[i / chunk].x;
-  keys[i] = here ? pairs[i].y : ABSENT;
+  keys[i] = here ? pairs[i].y : absent;
   splats[i] = here ? (int)pairs[i].x : 0;
 }
 

@@ -1,17 +1,16 @@
 // sort: a stable radix sort and prefix sums for many work-groups: the GPU form of what bin.cl does
-// a chunk at a time.  OpenCL 1.2, no atomics, no subgroups. A group of GROUP items owns SPAN
-// contiguous keys, an item PER_ITEM of them, so that counts laid out digit by digit and item by
-// item give each key its stable place.
+// a chunk at a time.  OpenCL 1.2, atomics in local memory alone, no subgroups.  A group of GROUP
+// items owns SPAN contiguous keys and walks through them GROUP at a time; in each such block a bit
+// set a digit says which items hold it, and the bits below one's own are one's rank: stable.
 // Reads:   keys and values (count,), or data to be summed.
 // Writes:  sorted keys and values; exclusive sums.
 // Units:   none.
 #define GROUP 256
 #define PER_ITEM 8
 #define SPAN (GROUP * PER_ITEM)
-// Four bits a pass: the local table of 16 digits x 256 items is 16 KiB of the 32 that OpenCL
-// promises.
-#define DIGIT_BITS 4
-#define DIGITS 16
+#define DIGIT_BITS 8
+#define DIGITS 256        // as many as items: each has one to count and to clear
+#define WORDS (GROUP / 32)
 
 // Exclusive sum over the group of one number an item.  Returns the sum before; *total: of all.
 inline int group_scan(int value, __local int* shared, int* total) {
@@ -56,57 +55,72 @@ __kernel void add_sums(int count, __global int* data, __global const int* sums) 
   if (i < count) data[i] += sums[i / SPAN];
 }
 
-// Local counts [digit][item] of a group's keys; then exclusive sums of them in that order.
-inline void count_and_scan(int count, int shift, __global const uint* keys, __local int* counts,
-                           __local int* shared) {
-  const int l = get_local_id(0), first = get_group_id(0) * SPAN + l * PER_ITEM;
-  // A column of the table is written by its item alone: no atomics, and the order within an item
-  // stays.
-  for (int d = 0; d < DIGITS; d++) counts[d * GROUP + l] = 0;
-  for (int k = 0; k < PER_ITEM; k++)
-    if (first + k < count) counts[(keys[first + k] >> shift & (DIGITS - 1)) * GROUP + l]++;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  int sum = 0, total;  // an item scans DIGITS neighbours of the flat table
-  for (int k = 0; k < DIGITS; k++) sum += counts[l * DIGITS + k];
-  int before = group_scan(sum, shared, &total);
-  for (int k = 0; k < DIGITS; k++) {
-    const int n = counts[l * DIGITS + k];
-    counts[l * DIGITS + k] = before;
-    before += n;
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-}
-
-// table [digit][group]: how many keys of each digit a group has.
+// table [digit][group]: how many keys of each digit a group has.  base: what keys are counted from.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void count_digits(
-    int count, int groups, int shift, __global const uint* keys, __global int* table) {
-  __local int counts[DIGITS * GROUP], shared[GROUP];
-  count_and_scan(count, shift, keys, counts, shared);
-  const int d = get_local_id(0), group = get_group_id(0);
-  if (d < DIGITS) {
-    const int all = min(SPAN, count - group * SPAN);
-    // In the scanned table neighbouring digits' first entries differ by the digit's count.
-    const int end = d + 1 < DIGITS ? counts[(d + 1) * GROUP] : all;
-    table[d * groups + group] = end - counts[d * GROUP];
-  }
+    int count, int groups, uint base, int shift, __global const uint* keys, __global int* table) {
+  __local int occurrences[DIGITS];
+  const int l = get_local_id(0), group = get_group_id(0);
+  occurrences[l] = 0;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  // The digits of a group's keys add up to the same in any order.
+  for (int i = group * SPAN + l; i < min(count, (group + 1) * SPAN); i += GROUP)
+    atomic_inc(&occurrences[(keys[i] - base) >> shift & (DIGITS - 1)]);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  table[l * groups + group] = occurrences[l];
 }
 
-// table is scanned: where each group's keys of each digit go.
+// A group a digit: how many of its keys the groups before have, in place; totals[digit]: of all.
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scan_digits(
+    int groups, __global int* table, __global int* totals) {
+  __local int shared[GROUP];
+  const int l = get_local_id(0), digit = get_group_id(0);
+  int carry = 0, total;
+  for (int first = 0; first < groups; first += GROUP) {
+    const int at = digit * groups + first + l;
+    const int here = first + l < groups ? table[at] : 0;
+    const int before = group_scan(here, shared, &total);
+    if (first + l < groups) table[at] = carry + before;
+    carry += total;
+  }
+  if (l == 0) totals[digit] = carry;
+}
+
+// table and totals are scan_digits': where each group's keys of each digit go.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scatter_digits(
-    int count, int groups, int shift, __global const uint* keys, __global const int* values,
-    __global const int* table, __global uint* sorted_keys, __global int* sorted_values) {
-  __local int counts[DIGITS * GROUP], shared[GROUP], starts[DIGITS];
-  const int l = get_local_id(0), group = get_group_id(0), first = group * SPAN + l * PER_ITEM;
-  count_and_scan(count, shift, keys, counts, shared);
-  if (l < DIGITS) starts[l] = counts[l * GROUP];
-  barrier(CLK_LOCAL_MEM_FENCE);
-  for (int k = 0; k < PER_ITEM; k++) {
-    if (first + k >= count) break;
-    const uint key = keys[first + k];
-    const int d = key >> shift & (DIGITS - 1);
-    // Place = where the group's digit begins + the key's rank in the group among equal digits.
-    const int to = table[d * groups + group] + counts[d * GROUP + l]++ - starts[d];
-    sorted_keys[to] = key;
-    sorted_values[to] = values[first + k];
+    int count, int groups, uint base, int shift, __global const uint* keys,
+    __global const int* values, __global const int* table, __global const int* totals,
+    __global uint* sorted_keys, __global int* sorted_values) {
+  __local int shared[GROUP], next[DIGITS];  // next: where the group's next key of a digit goes
+  __local uint holders[WORDS * DIGITS];     // [word][digit]
+  const int l = get_local_id(0), group = get_group_id(0), word = l / 32;
+  const uint bit = 1u << (l % 32);
+  int all;
+  // A digit's keys begin where those of all digits before it end.
+  next[l] = group_scan(totals[l], shared, &all) + table[l * groups + group];
+  for (int block = 0; block < PER_ITEM; block++) {
+    // A digit's bit set is cleared by the item of its number.
+    for (int w = 0; w < WORDS; w++) holders[w * DIGITS + l] = 0;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    const int i = group * SPAN + block * GROUP + l;
+    const bool here = i < count;
+    const uint key = here ? keys[i] : 0;
+    const int d = (key - base) >> shift & (DIGITS - 1);
+    const int to = next[d];
+    // Bits may be set in any order: the set is the same.
+    if (here) atomic_or(&holders[word * DIGITS + d], bit);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (here) {
+      int rank = 0, total = 0;
+      for (int w = 0; w < WORDS; w++) {
+        const uint bits = holders[w * DIGITS + d];
+        total += popcount(bits);
+        rank += popcount(w < word ? bits : w == word ? bits & (bit - 1) : 0);
+      }
+      sorted_keys[to + rank] = key;
+      sorted_values[to + rank] = values[i];
+      // The last holder moves the group's next place on, after everybody has read it.
+      if (rank == total - 1) next[d] = to + total;
+    }
+    barrier(CLK_LOCAL_MEM_FENCE);
   }
 }

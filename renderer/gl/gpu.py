@@ -81,12 +81,12 @@ class Gpu:
         self.ctx.memory_barrier()
 
     def run_indirect(
-        self, program: moderngl.ComputeShader, groups: moderngl.Buffer, **uniforms: Any
+        self, program: moderngl.ComputeShader, groups: moderngl.Buffer, at: int = 0, **uniforms: Any
     ) -> None:
-        """The same with as many groups as a buffer (3,) of the GPU says."""
+        """The same with as many groups as three numbers of a buffer say, from byte `at` on."""
         for name, value in uniforms.items():
             program[name].value = value
-        program.run_indirect(groups)
+        program.run_indirect(groups, at)
         self.ctx.memory_barrier()
 
     @contextmanager

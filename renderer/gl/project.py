@@ -20,8 +20,9 @@ NO_COUNTS[layout.COUNTS["NEAREST"]] = layout.CULLED_KEY
 class Projector:
     """Writes the records, keys and counts of an arena, for one view or for two at once."""
 
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
+    def __init__(self, gpu: Gpu, key_range: bool = False) -> None:
+        """key_range: finds it for the sort in GL, which then takes fewer passes."""
+        self._gpu, self._key_range = gpu, key_range
         self._under_way = UnderWay[tuple[moderngl.Buffer, int]]()  # counts of frames, and the view
         self._spare: list[moderngl.Buffer] = []
         self._counted: Arena | None = None  # whose these are
@@ -34,7 +35,8 @@ class Projector:
     ) -> moderngl.ComputeShader:  # fmt: skip
         return self._gpu.compute(
             "project.comp", VIEWS=views, SORT_FRAME=int(own_frame), FADE=int(settings.fade > 0),
-            KEY_RANGE=int(settings.key_bits == 16), BY_DISTANCE=int(settings.order == "distance"),
+            KEY_RANGE=int(settings.key_bits == 16 or self._key_range),
+            BY_DISTANCE=int(settings.order == "distance"),
             ANTIALIASED=int(antialiased), OWN_COLORS=int(own_colors), PAGED=int(paged), PAGE=PAGE,
         )  # fmt: skip
 

@@ -51,7 +51,7 @@ class QuadsDrawing(Drawing):
         self._mlps = mlps
         self.decodes_on_gpu = mlps == "gl"  # says which clock times the decoding
         self._gpu = gpu
-        self._projector = Projector(gpu)
+        self._projector = Projector(gpu, key_range=self._sorter.backend == "gl")
         self._splatter = Splatter(gpu)
         self.stereo_pair = StereoPairSplatter(gpu) if is_software(gpu.ctx) else None
         self._foveated = FoveatedSplatter(gpu)

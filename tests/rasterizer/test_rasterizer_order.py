@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shapeshift.rasterizer.bin import bin_tiles, quantize_keys, sort_order
+from shapeshift.rasterizer.bin import bin_tiles, quantize_keys, sort_order, sort_pairs
 from shapeshift.rasterizer.project import grid_of, project
 from shapeshift.rasterizer.project_arena import SortFrames, project_arena
 from tests.support.renderer.rasterizer_scenes import (
@@ -36,6 +36,26 @@ def projected_in(count: int, frames: int, keep_outside: bool = False):
     sort = SortFrames(tuple(c.camera_from_world for c in cameras[:frames]), False, keep_outside)
     given = (device().upload(rows), *others, np.eye(4)[None], cameras)
     return project_arena(device(), *given, sort=sort)
+
+
+@pytest.mark.parametrize("count", [*COUNTS, 256 * 2048 + 1])  # the last: two rounds of the scan
+def test_pairs_are_sorted_as_numpy_sorts_them(count):
+    rng = np.random.default_rng(count)
+    anything = rng.integers(0, 2**32, count, dtype=np.uint32)
+    cases = {  # keys, bits, base
+        "all bits": (anything, 32, 0),
+        "equal": (np.full(count, 0xFFFFFFFF, np.uint32), 32, 0),
+        "few": (anything % 3 << np.uint32(7), 9, 0),
+        "a range": (np.uint32(0x3F000001) + anything % 0xFFFFFF, 24, 0x3F000001),
+        "no bits": (anything * 0, 0, 0),
+    }
+    for name, (keys, bits, base) in cases.items() if count < 5000 else [*cases.items()][3:4]:
+        values = np.arange(count, dtype=np.int32)[::-1].copy()
+        given = device().upload(keys), device().upload(values)
+        got = [device().download(a) for a in sort_pairs(device(), *given, bits, base)]
+        order = np.argsort(keys, kind="stable")
+        np.testing.assert_array_equal(got[0], keys[order], name)
+        np.testing.assert_array_equal(got[1], values[order], name)
 
 
 @pytest.mark.parametrize("frames", [1, 2])

@@ -5,6 +5,7 @@ import zipfile
 import zlib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from shapeshift.app.page.page_file import (
     packed,
     page_text,
 )
-from shapeshift.app.page.page_scene import PageSettings, page_scene
+from shapeshift.app.page.page_scene import PageSettings, cut_to_ground, page_scene
 from shapeshift.runtime_models.model import BadFile, ScaffoldModel
 from shapeshift.scene.scene import Scene
 from shapeshift.scene.selectors.selector import Lens
@@ -171,3 +172,21 @@ def test_pictures_of_the_stops_have_false_colours():
     bytes_ = base64.b64decode(pictures[0.4].split(",")[1])
     shown = np.asarray(Image.open(io.BytesIO(bytes_)).convert("RGB"), int)
     assert np.abs(np.diff(shown, axis=2)).max() > 100  # ironbow is no grey
+
+
+@pytest.mark.parametrize(("wxyz", "height", "top"), [
+    ((1.0, 0.0, 0.0, 0.0), 0.1, 0.05), ((0.0, 1.0, 0.0, 0.0), 0.1, 0.5),
+    ((1.0, 0.0, 0.0, 0.0), 0.6, 0.5),
+])  # fmt: skip
+def test_things_that_begin_in_a_bench_stand_on_what_lies_under_them(wxyz, height, top):
+    """Not on the top of its box, which is that of the machine on it; it is upright, and they in
+    it, or nothing is cut.
+    """
+    place: Any = {"wxyz": list(wxyz), "position": [0.0, 0.5, 0.0], "centre": [0.0] * 3,
+                  "half": [1.0, 0.5, 1.0], "radius": 1.5}  # fmt: skip
+    thing: Any = {"wxyz": [1.0, 0.0, 0.0, 0.0], "position": [0.3, 0.5 + height, 0.0],
+                  "centre": [0.0] * 3, "half": [0.05] * 3}  # fmt: skip
+    cut_to_ground(place, [thing])
+    assert place["centre"][1] + place["half"][1] == pytest.approx(top)
+    assert place["centre"][1] - place["half"][1] == pytest.approx(-0.5)
+    assert place["radius"] >= 1.5

@@ -5,12 +5,16 @@ import socket
 import struct
 import threading
 import time
+import webbrowser
+from types import SimpleNamespace
 
 import pytest
 
+from shapeshift.app import cli
 from shapeshift.app.errors import UsageError
 from shapeshift.app.page import serve
 from shapeshift.app.page.serve import HERE, LocalServer, PageServer
+from shapeshift.renderer.gl.context import NoContext
 from shapeshift.runtime_models.package.feature_codes import EXACT
 from shapeshift.runtime_models.package.write_package import write_package
 from tests.support.web.page_scenes import paced_model
@@ -154,3 +158,99 @@ def test_a_page_follows_its_file(tmp_path, monkeypatch, capsys):
     assert said.count("the page stays as it was") == 1 and said.count("shown anew") == 1
     with server:  # so that it can be closed
         assert threading.active_count() > 1
+
+
+# ---- in place of the window
+
+
+class StandInBrowser:
+    """`opens` says whether it does; what it was given is in `opened`."""
+
+    name = "/usr/bin/firefox"
+
+    def __init__(self, opens: bool) -> None:
+        self.opens, self.opened = opens, []
+
+    def open(self, address: str) -> bool:
+        self.opened.append(address)
+        return self.opens
+
+
+@pytest.fixture
+def visit(tmp_path, monkeypatch, capsys):
+    """visit(words, browser=, terminal=, ...) -> (exit code, what was said, the page that was)."""
+    package = tmp_path / "a.shift"
+    write_package(paced_model(30), package)
+
+    def desktop_run(options):
+        raise NoContext("no window with OpenGL 4.3 could be opened (why); `x headless` needs none.")
+
+    def visit(words, browser=None, terminal=False, display=True, there=True):
+        pages = []
+
+        def look(options, server):
+            pages.append(ask(server, server.address.partition(str(server.port))[2])[2])
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("shapeshift.app.editor.desktop.run", desktop_run)
+        monkeypatch.setattr(serve, "follow", look)
+        monkeypatch.setattr(serve, "find_browser", lambda: browser)
+        monkeypatch.setattr(serve, "is_display_there", lambda: there)
+        monkeypatch.setattr(cli, "has_display", lambda: display)
+        monkeypatch.setattr("sys.stderr.isatty", lambda: terminal, raising=False)
+        code = cli.main(["view", str(package), *map(str, words)])
+        return code, capsys.readouterr().err, pages
+
+    return visit
+
+
+def test_where_there_is_no_window_the_page_opens(visit):
+    browser = StandInBrowser(True)
+    code, said, (page,) = visit(["--x", "Thermal", "--section", "0,0,1,0"], browser)
+    assert code == 0 and b"<html" in page and browser.opened[0] in said
+    assert "No window here: no window with OpenGL 4.3 could be opened (why). The page" in said
+    assert "It leaves out --section, which the window has." in said and "ssh" not in said
+    code, said, pages = visit(["--browser"], browser)
+    assert code == 0 and "A browser was asked for." in said and len(pages) == 1
+
+
+def test_without_a_browser_the_address_is_told_where_somebody_reads(visit, monkeypatch):
+    monkeypatch.setenv("SSH_CONNECTION", "10.0.0.2 50000 10.0.0.7 22")
+    for how in ({}, {"display": False}, {"browser": StandInBrowser(False)}):
+        code, said, pages = visit([], terminal=True, **how)
+        port = said.partition(f"{HERE}:")[2].partition("/")[0]
+        assert code == 0 and len(pages) == 1 and "It is at http://" in said
+        assert f"`ssh -L {port}:{HERE}:{port} 10.0.0.7`" in said
+    assert visit(["--browser"], display=False)[0] == 0  # asked for: whoever reads it
+
+
+def test_where_nobody_would_see_it_there_is_a_sentence(visit, tmp_path):
+    firefox = StandInBrowser(True)
+    for how in ({}, {"display": False}, {"browser": firefox, "there": False}):
+        code, said, pages = visit([], **how)
+        assert (code, pages, firefox.opened) == (2, [], []) and "`x headless` needs none" in said
+    picture = ["--screenshot", tmp_path / "a.png"]
+    assert visit(picture, browser=firefox, terminal=True)[0] == 2
+    code, said, pages = visit([tmp_path / "a.shift", "--browser"], browser=firefox)
+    assert (code, pages) == (2, []) and "The page shows one scene; name one of the 2." in said
+
+
+def test_a_port_that_is_taken_leads_to_the_next():
+    with PageServer(0) as taken, serve.server_on_free_port(taken.port) as server:
+        assert server.port != taken.port
+        first_free = range(taken.port + 1, taken.port + serve.PORTS)
+        assert server.port in first_free or taken.port + serve.PORTS > 65535
+
+
+@pytest.mark.parametrize(
+    ("found", "is_one"),
+    [("/usr/bin/firefox", True), ("lynx", False), ("/usr/bin/www-browser", False), (None, False)],
+)
+def test_browsers_of_a_terminal_draw_no_page(monkeypatch, found, is_one):
+    def get():
+        if found is None:
+            raise webbrowser.Error("could not locate runnable browser")
+        return SimpleNamespace(name=found)
+
+    monkeypatch.setattr(webbrowser, "get", get)
+    assert (serve.find_browser() is not None) == is_one

@@ -43,9 +43,9 @@ SCRIPT = """# Takes the mug, lifts it, throws it at the wrench.
 {"t": 0.3, "do": "hand", "position": [-0.13, 0.05, 0.22]}
 {"t": 0.4, "do": "grab"}
 {"t": 0.5, "do": "hand", "position": [-0.13, 0.05, 0.22]}
-{"t": 1.0, "do": "hand", "position": [-0.15, 0.22, 0.26]}
-{"t": 1.3, "do": "hand", "position": [-0.15, 0.22, 0.26]}
-{"t": 1.55, "do": "hand", "position": [0.12, 0.25, 0.29]}
+{"t": 1.0, "do": "hand", "position": [-0.15, 0.22, 0.3]}
+{"t": 1.3, "do": "hand", "position": [-0.15, 0.22, 0.3]}
+{"t": 1.55, "do": "hand", "position": [0.1, 0.25, 0.29]}
 {"t": 1.55, "do": "release"}
 """
 

@@ -103,11 +103,56 @@ def test_passes_after_the_first_have_what_is_sorted_alone(gpu, bits):
             keys[here] = rng.uniform(0.5, 4.0, drawn).astype(np.float32).view(np.uint32)
             set_keys(arena, keys)
             sorter.sort(arena, bits)
-            assert read(arena.dispatch, np.uint32).tolist() == [-(-drawn // GROUP), 1, 1]
+            groups = [-(-drawn // GROUP), 1, 1, layout.RADIX if drawn else 0, 1, 1]
+            told = read(arena.dispatch, np.uint32).reshape(-1, 3)[:6].reshape(3, 6)
+            passes = told[:, 0].astype(bool).sum() + 1
+            for later in range(3):
+                none = later >= passes - 1
+                assert told[later].tolist() == ([0, 1, 1, 0, 1, 1] if none else groups)
+            assert passes <= bits // 8
             order = read(arena.order, np.uint32)[:drawn]
             if bits == 32:
                 np.testing.assert_array_equal(order, np.argsort(keys, kind="stable")[:drawn])
             np.testing.assert_array_equal(np.sort(order), here)
+
+
+@pytest.mark.parametrize(
+    ("span", "passes"), [(0, 1), (255, 1), (256, 2), (65535, 2), (65536, 3), (2**24 - 1, 3),
+                         (2**24, 4), (2**32 - 2, 4)],
+)  # fmt: skip
+def test_as_many_passes_as_the_range_of_the_keys_asks_for(gpu, span, passes):
+    """The last key has all bits set but one where the range is the largest."""
+    n, rng = GROUP + 1, np.random.default_rng(span)
+    least = min(0x3F000001, 2**32 - 2 - span)
+    keys = (least + rng.integers(0, span + 1, n)).astype(np.uint32)
+    keys[[7, 5]] = least, least + span
+    with Arena(gpu, [n]) as arena:
+        set_keys(arena, keys)
+        Sorter(gpu, "gl").sort(arena, 32)
+        told = read(arena.dispatch, np.uint32)
+        assert told[layout.DISPATCH["PASSES"]] == passes
+        np.testing.assert_array_equal(read(arena.order, np.uint32), np.argsort(keys, kind="stable"))
+
+
+def test_more_groups_than_one_round_of_the_scan_adds_up(gpu):
+    n = layout.WORKGROUP * GROUP + 1
+    keys = np.random.default_rng(n).integers(0, 700, n).astype(np.uint32)
+    with Arena(gpu, [n]) as arena:
+        set_keys(arena, keys)
+        Sorter(gpu, "gl").sort(arena, 32)
+        np.testing.assert_array_equal(read(arena.order, np.uint32), np.argsort(keys, kind="stable"))
+
+
+def test_a_range_that_nobody_found_takes_all_passes(gpu):
+    keys = np.random.default_rng(3).integers(0, 700, 300).astype(np.uint32)
+    with Arena(gpu, [300]) as arena:
+        arena.keys.write(keys)
+        counts = np.zeros(layout.COUNTS_SIZE, np.uint32)
+        counts[[layout.COUNTS["SORTED"], layout.COUNTS["NEAREST"]]] = 300, layout.CULLED_KEY
+        arena.counts.write(counts)
+        Sorter(gpu, "gl").sort(arena, 32)
+        assert read(arena.dispatch, np.uint32)[layout.DISPATCH["PASSES"]] == 4
+        np.testing.assert_array_equal(read(arena.order, np.uint32), np.argsort(keys, kind="stable"))
 
 
 def test_quantize_spans_the_range_and_survives_one_depth():

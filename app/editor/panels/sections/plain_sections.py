@@ -299,6 +299,7 @@ def _counts(readings: FrameStatsView, ui_scale: float) -> None:
             ("slowest of a second", f"{ms_text(meter.slowest_ms)} ms"),
             ("sorts a second", f"{meter.per_second('sorts', now):.0f}"),
             ("age of the order", said("{count} frames", count=readings.stats.order_age)),
+            ("age of these counts", said("{count} frames", count=readings.stats.age)),
             ("shapes decoded a second", f"{shapes:.0f}"),
             ("colours decoded a second", f"{colors:.0f}"),
             ("of all frames", f"{number(meter.geometry_runs)}, {number(meter.color_runs)}"),
