@@ -24,7 +24,6 @@ from dataclasses import replace
 from itertools import cycle, repeat
 from pathlib import Path
 from statistics import median
-from typing import Any, cast
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT)]
@@ -122,7 +121,7 @@ class Alone:
 
 def measure(viewer: Viewer) -> list[str]:
     window = viewer.window
-    if not cast(Any, window.presented).keeps:
+    if window.presented.kept is None:
         raise SystemExit("GL runs on a GPU here, which keeps no picture.")
     ways = {"each time": way_of_a_gpu(window.presented), "kept": window.presented}
     watch, rows = Watch(window), []

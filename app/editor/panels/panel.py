@@ -75,7 +75,8 @@ TOOLS = (
          ("Gallery", "Look"), (), "There is nothing to be styled."),
     Tool("Film", "\uf008", "Keys of the camera and of the slider, and the film of them.",
          ("Film",)),
-    Tool("Share", "\uf1e0", "Files for other programs.", ("Export", "Cameras")),
+    Tool("Share", "\uf1e0", "A web page, files for other programs.",
+         ("Web page", "Export", "Cameras")),
 )  # fmt: skip
 SETUP = Tool("Settings", "\uf013", "Units, speed and quality.",
              ("Settings", "Performance"))  # fmt: skip

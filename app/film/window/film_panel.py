@@ -18,7 +18,13 @@ from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.state.layout import Box
 from shapeshift.app.editor.texts.table import said
 from shapeshift.app.film.film_plan import FilmPlan
-from shapeshift.app.film.window.rendering import VIDEOS, WANT_PYAV, ExtraInstall, Rendering
+from shapeshift.app.film.window.rendering import (
+    VIDEOS,
+    WANT_PYAV,
+    ExtraInstall,
+    PageShare,
+    Rendering,
+)
 from shapeshift.app.film.window.timeline import CAMERA, STOP, Timeline
 from shapeshift.runtime_models.stop_weights import StopWeights, control_text
 
@@ -356,6 +362,25 @@ class FilmPanel:
         tip("Puts PyAV beside the program; the window goes on.", ui_scale)
 
 
+def draw_page(page: PageShare, state: EditorState, ui_scale: float) -> None:
+    """The section "Web page": makes it and opens it, or how far it is."""
+    if not state.scene.objects:
+        imgui.text_disabled(said("There is nothing to share."))
+    elif page.running:
+        words, part = page.progress
+        imgui.progress_bar(part, Vec(-1, 0), words)
+        if imgui.button(item_label("Cancel"), Vec(-1, 0)):
+            page.cancel()
+    else:
+        if imgui.button(item_label("Make the page and open it"), Vec(-1, 0)):
+            page.start()
+        tip(PAGE_TIP, ui_scale)
+
+
+PAGE_TIP = (
+    "One file with the slider, for any browser, in Shapeshift/exports of your documents. It shows "
+    "the scene as it was saved."
+)
 PAST, AROUND = "Past cameras", "Around"
 
 

@@ -1,4 +1,4 @@
-"""Films in the window: the sections Film and Gallery, and files of paths that are dropped."""
+"""What commands make beside the window: the sections Film, Gallery and Web page; dropped paths."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,10 +10,10 @@ from shapeshift.app.editor.texts.table import said
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.window import Drop, Event, Window
 from shapeshift.app.errors import UsageError
-from shapeshift.app.film.window.film_panel import FilmPanel, Preview, draw_film_edge
+from shapeshift.app.film.window.film_panel import FilmPanel, Preview, draw_film_edge, draw_page
 from shapeshift.app.film.window.gallery import Gallery
 from shapeshift.app.film.window.gallery_panel import draw_gallery
-from shapeshift.app.film.window.rendering import Rendering, origin_on_disk
+from shapeshift.app.film.window.rendering import PageShare, Rendering, origin_on_disk
 from shapeshift.app.film.window.style_work import StyleWork
 from shapeshift.app.paths import WorkFolders
 from shapeshift.runtime_models.model import BadFile
@@ -32,6 +32,7 @@ class Films:
         self.styles = StyleWork(state, folders.scenes, lambda path: open_soon((path,)))
         self.preview = Preview(state, viewpoint)
         self.rendering = Rendering(state, folder)
+        self.page = PageShare(state, folders.exports)
         self.gallery = Gallery(state)
         self.panel = FilmPanel(state, viewpoint, self.preview, self.rendering)
         self._textures = window.textures
@@ -43,6 +44,7 @@ class Films:
         """What plays, is drawn or is waited for; True while there is such."""
         playing = self.preview.each_frame()
         children = [self.rendering.poll(), self.rendering.pyav.poll(), self.styles.poll()]
+        children.append(self.page.poll())
         return any([playing, *children, self.gallery.each_frame()])
 
     def handle_event(self, event: Event) -> bool:
@@ -70,17 +72,18 @@ def attach_films(
     window: Window, state: EditorState, viewpoint: Viewpoint, hooks: Hooks, folders: WorkFolders,
     open_soon: Callable[[tuple[Path, ...]], None], actions: PanelActions,
 ) -> Films:  # fmt: skip
-    """Adds both sections and the timeline to a viewer; `open_soon` opens what was made."""
+    """Adds the sections and the timeline to a viewer; `open_soon` opens what was made."""
     films = Films(window, state, viewpoint, folders, open_soon)
     films.panel.close = lambda: actions.choose(TOOLS[0].name)
     hooks.film = lambda: actions.tool() == "Film" and bool(state.scene.objects)
     hooks.sections += [
         Section("Gallery", films.draw_gallery, shown=lambda: bool(state.scene.objects)),
         Section("Film", films.panel.draw),
+        Section("Web page", lambda scale: draw_page(films.page, state, scale)),
     ]
     hooks.each_frame.append(films.each_frame)
     hooks.event_handlers.append(films.handle_event)
     hooks.marks.append(lambda scale: draw_film_edge(state, viewpoint, scale))
     hooks.opened.append(films.gallery.forget)
-    hooks.status += [films.rendering.status, films.styles.status]
+    hooks.status += [films.rendering.status, films.styles.status, films.page.status]
     return films

@@ -1,4 +1,6 @@
-"""A film of the timeline, drawn by the program's own command beside the window."""
+"""A film of the timeline, and a page of the scene, made by the program's own commands beside the
+window.
+"""
 
 import atexit
 import importlib
@@ -8,8 +10,10 @@ import re
 import subprocess
 import sys
 import threading
+import webbrowser
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import IO
 
@@ -260,6 +264,63 @@ class Rendering(ChildWork):
 
     def show(self, child: ProgramChild) -> None:
         self._state.say(child.said, seconds=8)
+
+
+class PageShare(ChildWork):
+    """The scene as a page, one file that any browser opens; it is opened once it is made."""
+
+    def __init__(self, state: EditorState, folder: Path) -> None:
+        super().__init__()
+        self._state, self._folder, self._path = state, folder, Path()
+        self._opening: Future[bool] | None = None
+
+    def status(self) -> str:
+        """Words for the status line; "" when nothing is under way."""
+        return said("page {part:.0%}", part=self.progress[1]) if self.running else ""
+
+    def start(self) -> None:
+        """Begins to write; what is moved meanwhile does not show in the page."""
+        try:
+            scene, reading = scene_on_disk(self._state)
+            make_folder(self._folder)
+            self._path = free_name(self._folder, Path(self._state.title).name, ".html")
+            self._child = ProgramChild(["export", str(scene), *reading, "--out", str(self._path)])
+        except (OSError, UsageError) as error:
+            self.say_failed(error)
+
+    def poll(self) -> bool:
+        """Once a frame: says how it ended; True while it is under way."""
+        opening = self._opening
+        if opening is None or not opening.done():
+            return super().poll() or opening is not None
+        self._opening = None
+        if not opening.result():
+            path = self._path
+            told = said("No browser could be started here; the page is {path}", path=path)
+            self._state.say(told, seconds=20)
+        return True
+
+    def say_left(self) -> None:
+        self._state.say(said("The page was left."))
+
+    def say_failed(self, why: object) -> None:
+        self._state.problem = said("There is no page: {error}", error=why)
+
+    def show(self, child: ProgramChild) -> None:
+        self._state.say(said("The page is {path}", path=self._path), seconds=8)
+        thread = ThreadPoolExecutor(1, "browser")
+        self._opening = thread.submit(open_in_browser, self._path)
+        thread.shutdown(wait=False)
+
+
+def open_in_browser(path: Path) -> bool:
+    """Shows a page in the browser of the desktop; False where there is none."""
+    try:
+        browser = webbrowser.get()
+        in_terminal = type(browser) is webbrowser.GenericBrowser and "BROWSER" not in os.environ
+        return not in_terminal and browser.open(path.as_uri())
+    except (webbrowser.Error, OSError):
+        return False
 
 
 def scene_on_disk(state: EditorState) -> tuple[Path, list[str]]:

@@ -57,7 +57,7 @@ TABLES_BESIDE = {
     "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "UNSAVED": ALL},
     "editor.window.recovering": {"ANSWERS": ALL},
     "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},
-    "film.window.film_panel": {"AROUND": ALL, "PAST": ALL, "TRACK_NAMES": ALL},
+    "film.window.film_panel": {"AROUND": ALL, "PAST": ALL, "TRACK_NAMES": ALL, "PAGE_TIP": ALL},
     "inspection.window.inspect_panel": {
         "COLUMNS": ALL, "BOUND_TIPS": ALL, "VALUE_TIPS": ALL, "AUTO_TIPS": ALL, "MEASURES": ALL,
         "EMISSIVITY": ALL,

@@ -1,8 +1,10 @@
 """The panel's section "Export" under Xvfb: what is written, in the background, and what is said."""
 
 import time
+import webbrowser
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from shapeshift.app.editor.state.files.exporting import EVERYTHING, REGIONS, Exporting
 from shapeshift.runtime_models.splats.formats import read_plain
 from tests.support.desktop.desktop_stand import ball, run_frames
+from tests.support.desktop.widgets import Widgets
 from tests.support.splats.writers import EACH_WRITER
 
 
@@ -124,3 +127,41 @@ def test_the_window_goes_on_while_it_is_written(viewer, panel, monkeypatch):
     go.set()
     finish(viewer, panel)
     assert not viewer.state.problem
+
+
+@pytest.mark.parametrize("browser", [True, False, None])
+def test_share_makes_the_page_and_opens_it(viewer, hands, browser, monkeypatch):
+    """By the command; where no browser is there or starts (None, False) it says where it lies."""
+    began, opened = [], []
+    child = SimpleNamespace(progress=("writing", 0.4), code=None, cancelled=False, problem=str)
+    module = "shapeshift.app.film.window.rendering"
+    monkeypatch.setattr(f"{module}.ProgramChild", lambda words: began.append(words) or child)
+
+    def get() -> SimpleNamespace:
+        if browser is None:
+            raise webbrowser.Error
+        return SimpleNamespace(open=lambda url: opened.append(url) or browser)
+
+    monkeypatch.setattr(webbrowser, "get", get)
+    widgets = Widgets(monkeypatch)
+    viewer.shell.choose_tool("Share")
+    run_frames(viewer, 2)
+    hands.click(*widgets.middle("Make the page and open it"))
+    (words,) = began
+    assert words[:3] == ["export", "ball.shift", "--out"] and viewer.films.page.running
+    path = Path(words[3])
+    assert path.parent.name == "exports" and path.suffix == ".html"
+    assert "page 40%" in [words() for words in viewer.hooks.status]
+    child.code = 0
+    end = time.monotonic() + 20
+    while viewer.films.page.poll() and time.monotonic() < end:
+        run_frames(viewer, 1)
+    note = viewer.state.messages.note
+    assert str(path) in note and ("No browser" in note) == (not browser)
+    assert opened == [path.as_uri()] * (browser is not None)
+
+
+def test_a_page_of_a_scene_that_is_not_saved_says_so(viewer):
+    viewer.state.add_region("box")
+    viewer.films.page.start()
+    assert "save it first" in viewer.state.problem and not viewer.films.page.running
