@@ -93,7 +93,8 @@ def collider_of_model(
         low, high = np.percentile(model.anchors, (1, 99), axis=0)
         eye = (low + high) / 2 + np.array([0, 0, 2 * (high - low).max()])
     columns = Evaluator(model).geometry(x, eye=None if eye is None else np.asarray(eye, np.float32))
-    return collider_of_splats(*(columns if mend is None else mend(columns)), making)
+    means, scales, wxyz, opacity = columns if mend is None else mend(columns)
+    return collider_of_splats(means, scales, wxyz, opacity, making)
 
 
 def collider_of_mesh(path: Path, making: Making | None = None) -> Collider:

@@ -94,8 +94,9 @@ def ground_of_model(
     each = model.splat_count // max(len(places), 1)
     rows, times = rows_near(places, own, each)
     few = model.with_anchors(rows) if isinstance(model, AnchorModel) else model.with_rows(rows)
-    columns = [np.asarray(column) for column in Evaluator(few).geometry(x)]
-    made = quick_ground(NearSplats(*columns, np.repeat(times, each)), world_from_object, things)
+    means, scales, wxyz, opacity = (np.asarray(column) for column in Evaluator(few).geometry(x))
+    near = NearSplats(means, scales, wxyz, opacity, np.repeat(times, each))
+    made = quick_ground(near, world_from_object, things)
     if made.mesh is None:
         return None, made.stands
     vertices = made.mesh.vertices @ object_from_world[:3, :3].T + object_from_world[:3, 3]

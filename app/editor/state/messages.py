@@ -11,12 +11,20 @@ class Messages:
     def __init__(self) -> None:
         self.note = ""  # said for a few seconds
         self.problems: list[str] = []  # one sentence each, the newest last
-        self._until = 0.0
+        self.count = 0  # notes and problems that there have been
+        self._until, self._held = 0.0, ""
 
     def say(self, text: str, now: float, seconds: float | None = None) -> None:
         """Shows a note, longer for more lines; "" takes it away."""
         self.note = text
+        self.count += bool(text)
         self._until = now + (seconds or NOTE_S * (1 + text.count("\n")))
+
+    def hold(self, text: str, now: float) -> None:
+        """Shows what goes on, again and again; another note is let have its time."""
+        if not self.note or self.note == self._held:
+            self.say(text, now)
+            self._held = text
 
     def ended(self, now: float) -> bool:
         """True once when the note's time is over; it is gone then."""
@@ -29,6 +37,7 @@ class Messages:
         """Adds a problem; the same again is kept once, as the newest."""
         if len(sentence) > LONGEST:
             sentence = sentence[: LONGEST - 1] + "\u2026"
+        self.count += 1
         others = [other for other in self.problems if other != sentence]
         self.problems = [*others, sentence][-MOST_PROBLEMS:]
 

@@ -1,5 +1,6 @@
 """Touching a scene: its world played and stepped, what a hand holds, what has just answered."""
 
+import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -197,7 +198,9 @@ class TouchState:
                 self.wanted = False
                 self._say(said(self._state.bodies.why_none or NO_BODIES))
             if self._state.bodies.busy and self.opens_playing:
-                self._state.say(said("Getting objects ready to be touched \u2026"))
+                self._state.messages.hold(
+                    said("Getting objects ready to be touched \u2026"), time.perf_counter()
+                )
             return False
         if world is not self._known:
             self.meet(world)

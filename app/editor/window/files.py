@@ -1,5 +1,6 @@
 """The editor's files: those it opens while the window goes on, and those it opened before."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -228,5 +229,5 @@ def poll_opener(state: EditorState, opener: Opener, show: Callable[[OpenedFiles]
             state.say("")
             show(found)
     if opener.busy:
-        state.say(opener.note)
+        state.messages.hold(opener.note, time.perf_counter())
     return opener.busy

@@ -30,7 +30,9 @@ from shapeshift.scene.scene import SceneObject
 Matrix16: TypeAlias = imguizmo.im_guizmo.Matrix16
 Vec = imgui.ImVec2
 CORNER = 0.2  # of an edge of the box that shows what is chosen
-_, MOVE, TURN = HANDLES
+NONE, MOVE, TURN = HANDLES
+HANDLE_WORDS = {MOVE: "Drag an arrow to move it.", TURN: "Drag a ring to turn it.",
+                NONE: "No handles."}  # fmt: skip
 OPERATIONS = {
     MOVE: imguizmo.im_guizmo.OPERATION.translate,
     TURN: imguizmo.im_guizmo.OPERATION.rotate,
@@ -77,6 +79,8 @@ class Gizmo:
                 state.chosen = state.scene.objects[0].name
             else:
                 state.say(said("Click an object, or its name, to choose what to move."))
+                return
+        state.say(said(HANDLE_WORDS[state.handles]))
 
     @property
     def under_mouse(self) -> bool:

@@ -11,6 +11,7 @@ from shapeshift.app.editor.state.camera.camera import FAST, SLOW, Push
 from shapeshift.app.editor.state.camera.viewpoint import Viewpoint
 from shapeshift.app.editor.state.editor_state import EditorState
 from shapeshift.app.editor.texts.table import said
+from shapeshift.app.editor.window.answers import Answers
 from shapeshift.app.editor.window.hooks import Hooks
 from shapeshift.app.editor.window.window import (
     DoubleClick,
@@ -30,6 +31,8 @@ VIEWS = {  # of the numeric keypad, as Blender has them; the second with Ctrl
     glfw.KEY_KP_3: ("right", "left"),
     glfw.KEY_KP_7: ("top", "bottom"),
 }
+FLIES = "Flying: W A S D Q E move, a drag looks about. V orbits."
+ORBITS = "Orbiting: a drag turns about the scene. V flies."
 TURN = 0.006  # radians a logical pixel of mouse movement
 LOOK = 0.003
 
@@ -45,9 +48,16 @@ class InputActions:
         self._hooks, self._open_soon = hooks, open_soon
         self._pivot: np.ndarray | None = None  # (3,) metres, that a drag turns about
         self.pushes: list[Callable[[], Push]] = []  # what sticks and caps ask for
+        self._answers = Answers(window, state, viewpoint, hooks)
 
     def handle_event(self, event: Event) -> None:
-        """Lets one input event act."""
+        """Lets one input event act; a key that changes nothing is answered."""
+        if isinstance(event, KeyDown):
+            self._answers.key(event, self._act)
+        else:
+            self._act(event)
+
+    def _act(self, event: Event) -> None:
         if any(handle(event) for handle in self._hooks.event_handlers):
             return
         viewpoint = self._viewpoint
@@ -62,7 +72,7 @@ class InputActions:
                 pass
             case Drag() if viewpoint.steps.at_camera or viewpoint.flown is not None:
                 viewpoint.leave_camera()
-                self.handle_event(event)
+                self._act(event)
             case Drag(button="middle") | Drag(button="right") if self.pans(event):
                 camera.pan(-event.dx / height, event.dy / height)
             case Press(button="left"):
@@ -101,6 +111,7 @@ class InputActions:
                 viewpoint.keep_view()
             case glfw.KEY_V:
                 viewpoint.toggle_flying()
+                state.say(said(FLIES if viewpoint.camera.flying else ORBITS))
             case glfw.KEY_F if event.shift:
                 viewpoint.go_home()
             case glfw.KEY_F:
@@ -120,7 +131,7 @@ class InputActions:
                 state.save_picture = True
             case glfw.KEY_G:
                 state.next_debug_view(-1 if event.shift else 1)
-            case glfw.KEY_L:
+            case glfw.KEY_L if state.scene.objects:
                 state.say(said("Lens on" if state.toggle_lens() else "Lens off"))
             case glfw.KEY_ESCAPE:
                 state.regions.placing = False

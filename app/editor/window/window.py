@@ -1,5 +1,6 @@
 """The real window: glfw through moderngl-window, ImGui on top, input as a list of plain events."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,13 +115,15 @@ class Window:
         self.textures = Textures(self.ctx, self.presented.renderer)
         self.covered: tuple[theme.Box, ...] = ()  # where the overlay is, set by who draws it
         self.popup_open = False  # a list or a box is open, and the next click is for it
+        # Heard first: a key or the left button (None) is down, the button is up; a frame is drawn.
+        self.on_press: Callable[[int | None], None] = lambda key: None
+        self.on_release: Callable[[], None] = lambda: None
+        self.on_drawn: Callable[[imgui.ImDrawData], None] = lambda data: None
         self._raw: list[Event] = []
         self._chorded: set[int] = set()  # keys that are down for a shortcut, not for moving
         self._pressed: str | None = None  # the button whose drag the scene owns
-        self._last_click = (0.0, 0.0, -1.0)  # x, y, seconds
-        self._cursor = (0.0, 0.0)
-        self._unsettled = SETTLE_FRAMES
-        self._look_again = np.inf  # seconds on glfw's clock
+        self._cursor, self._last_click = (0.0, 0.0), (0.0, 0.0, -1.0)  # x, y; and seconds
+        self._unsettled, self._look_again = SETTLE_FRAMES, np.inf  # frames; seconds by glfw
         self._clock = glfw.get_time()
         self._listen()
 
@@ -249,8 +252,7 @@ class Window:
             theme.apply(self.ui_scale, every_letter=self.every_letter)
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(*self.logical_size)
-        density = self._window.pixel_ratio
-        io.display_framebuffer_scale = imgui.ImVec2(density, density)
+        io.display_framebuffer_scale = imgui.ImVec2(*[self._window.pixel_ratio] * 2)
         now = glfw.get_time()
         io.delta_time = max(now - self._clock, 1e-4)
         self._clock = now
@@ -269,6 +271,7 @@ class Window:
         self.popup_open = imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
         imgui.render()
         self.presented.lay_over(imgui.get_draw_data())
+        self.on_drawn(imgui.get_draw_data())
 
     def screen(self) -> moderngl.Framebuffer:
         """The window's framebuffer with the viewport on all of it."""
@@ -313,14 +316,15 @@ class Window:
             io.add_key_event(TEXT_KEYS[key], action != glfw.RELEASE)
         if action == glfw.RELEASE:
             self._chorded.discard(key)
-        if action == glfw.RELEASE or (io.want_text_input and key != glfw.KEY_F1):
-            return
-        if action == glfw.REPEAT and key not in REPEATING:
+        repeats = action == glfw.REPEAT and key not in REPEATING
+        typed = io.want_text_input and not glfw.KEY_F1 <= key <= glfw.KEY_F25
+        if action == glfw.RELEASE or typed or repeats:
             return
         if key == glfw.KEY_F11:
             self._window.fullscreen = not self._window.fullscreen
         if key == glfw.KEY_ESCAPE and self.popup_open:
             return  # for what is open
+        self.on_press(key)
         shortcut = self._shortcut(key, scancode, mods)
         if shortcut:
             self._chorded.add(key)
@@ -348,8 +352,9 @@ class Window:
     def on_button(self, handle, button: int, action: int, mods: int) -> None:
         if button not in BUTTONS:
             return
-        io = imgui.get_io()
-        x, y = self._cursor
+        io, (x, y) = imgui.get_io(), self._cursor
+        if button == glfw.MOUSE_BUTTON_LEFT:
+            self.on_press(None) if action == glfw.PRESS else self.on_release()
         io.add_mouse_button_event(button, action == glfw.PRESS)
         self.note()
         if action == glfw.RELEASE:
@@ -380,8 +385,7 @@ class Window:
     def _on_content_scale(self, handle, x: float, y: float) -> None:
         """The desktop's scale has changed, or the window has gone to another monitor."""
         self._monitor_size = self._size_for_monitor()
-        self._restyle = True
-        self.note()
+        self.restyle()
 
     def on_drop(self, handle, paths: list[str]) -> None:
         self.note(Drop(tuple(map(plain, paths))))

@@ -65,7 +65,7 @@ class Timeline:
         self.playing = False
         self.chosen: tuple[str, int] | None = None  # track and number of the key that is edited
         self.problem = ""  # why there is no film, one sentence
-        self._plan: tuple[tuple, FilmPlan | None] = ((), None)
+        self._plan: tuple[FilmKeys | None, tuple, FilmPlan | None] = (None, (), None)
 
     def forget(self) -> None:
         """Another scene."""
@@ -177,10 +177,11 @@ class Timeline:
     def plan(self, document: Document) -> FilmPlan | None:
         """The film as it would be drawn; None where there is none yet, or `problem` says why."""
         objects = tuple((obj.name, id(obj.model)) for obj in document.scene.objects)
-        made_of = (self.keys, objects)
-        if self._plan[0] != made_of:
-            self._plan = (made_of, self._make(document))
-        return self._plan[1]
+        known, of, plan = self._plan
+        if known is not self.keys or of != objects:  # keys are replaced, and their views are arrays
+            plan = self._make(document)
+            self._plan = (self.keys, objects, plan)
+        return plan
 
     def _make(self, document: Document) -> FilmPlan | None:
         self.problem, keys = "", self.keys

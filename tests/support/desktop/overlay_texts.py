@@ -48,6 +48,12 @@ TABLES = {
     "sections.stops_panel": {"MODE_NAMES": VALUES},
 }  # fmt: skip
 TABLES_BESIDE = {
+    "editor.window.answers": {
+        "TABLE": ALL, "EMPTY": ALL, "WAITS": ALL, "NOTHING": ALL, "NO_CHANGE": ALL,
+        "ONE_THING": ALL, "NOT_THERE": ALL,
+    },
+    "editor.window.gizmo": {"HANDLE_WORDS": VALUES},
+    "editor.window.hands": {"FLIES": ALL, "ORBITS": ALL},
     "editor.window.objects": {"OVER": ALL, "SAVE": ALL, "UNSAVED": ALL},
     "editor.window.recovering": {"ANSWERS": ALL},
     "editor.window.shell": {"GROUPS": ALL, "KEY_WORDS": VALUES},

@@ -70,10 +70,18 @@ def right_aligned(text: str) -> None:
     imgui.text_unformatted(text)
 
 
+class LastTip:
+    """What the item says of itself that was under the mouse last."""
+
+    text = ""
+
+
 def tip(text: str, ui_scale: float) -> None:
     """Explains the item before it when the mouse rests there, also when it is disabled; a ray
     never rests, and has no keys to be named.
     """
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        LastTip.text = said(text)
     rests = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
     if not (theme.has_keys() and imgui.is_item_hovered(rests)):
         return
