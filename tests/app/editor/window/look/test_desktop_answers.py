@@ -26,6 +26,7 @@ from tests.support.desktop.desktop_stand import PlainRenderer, ball, read_stub, 
 from tests.support.desktop.objects_stand import click, obj, viewer_of
 from tests.support.desktop.widgets import KINDS
 
+ONE_PIXEL = imgui.ImVec2(1.0, 1.0)
 SHIFT, CTRL = glfw.MOD_SHIFT, glfw.MOD_CONTROL
 CODES = {
     name[4:]: code
@@ -199,7 +200,7 @@ class Items:
             done = function(label, *values, **named)
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
             middle = ((low.x + high.x) / 2, (low.y + high.y) / 2)
-            if imgui.is_rect_visible(low, high):
+            if imgui.is_rect_visible(imgui.ImVec2(*middle), imgui.ImVec2(*middle) + ONE_PIXEL):
                 self.found[kind, label, imgui.get_item_id()] = middle
             return done
 
