@@ -28,6 +28,7 @@ from shapeshift.app.editor import desktop  # noqa: E402
 from shapeshift.app.editor.texts.table import language_in_use  # noqa: E402
 from shapeshift.app.paths import DEMO  # noqa: E402
 from shapeshift.runtime_models.files.whole_file import write_whole  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.runtime_models.splats.plain_splats import PlainSplats  # noqa: E402
 from shapeshift.runtime_models.splats.ply.write_ply import write_ply  # noqa: E402
@@ -51,7 +52,9 @@ class Jobs:
             self.person.press(name)
 
     def _mug(self) -> tuple[float, float]:
-        anchors = read_model(DEMO).anchors.astype(np.float64)
+        model = read_model(DEMO)
+        assert isinstance(model, AnchorModel)
+        anchors = model.anchors.astype(np.float64)
         mine = labels_of_places(anchors)[0] == LABELS["mug"]
         return place_of(self.viewer, np.median(anchors[mine], axis=0))
 
@@ -150,7 +153,7 @@ class Jobs:
         self.person.key("o", "Control_L")
         self.person.type(str(self.folder / "ball.ply"))
         self.person.key("Return")
-        return self.person.until(lambda: self.viewer.state.title == "ball", "the file")
+        return self.person.until(lambda: self.viewer.state.title == "ball")
 
 
 JOBS = ("heat", "split", "mark", "length", "section", "cut_out", "throw", "style", "film",
@@ -181,7 +184,9 @@ def start(display: str, act: Callable[[Person], list[Job]]) -> list[Job]:
     failed: list[BaseException] = []
     items, loop = Items(), desktop.Viewer.loop
 
-    def looped(viewer) -> None:
+    def looped(self: desktop.Viewer) -> None:
+        viewer = self
+
         def sit() -> None:
             try:
                 found.extend(act(person))
@@ -198,7 +203,7 @@ def start(display: str, act: Callable[[Person], list[Job]]) -> list[Job]:
         thread.join(PATIENCE_S)
 
     desktop.Viewer.loop = looped
-    desktop.run(desktop.Options(size="{}x{}".format(*SIZE)))
+    desktop.run(desktop.Options(scenes=(Path(DEMO),), size="{}x{}".format(*SIZE)))
     if failed:
         raise failed[0]
     return found

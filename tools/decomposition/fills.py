@@ -50,6 +50,7 @@ def rows_of(device: Device, folder: Path) -> list[dict]:
     options = Options(scene=folder / f"{folder.name}.shift", capture=folder,
                       out=folder / "x.scene.json", masks=folder / "labels")  # fmt: skip
     model = open_model(options.scene, options)
+    assert isinstance(model, AnchorModel)
     capture = straight_capture(options, model, lambda *said: None)
     pictures = read_pictures(folder / "labels", capture, model, 1)
     objects = named_objects(pictures, read_specs(folder / "objects.json").objects)

@@ -30,6 +30,7 @@ from shapeshift.app.editor.state.files.opened import read_files  # noqa: E402
 from shapeshift.app.editor.state.parts.cutting import make_object  # noqa: E402
 from shapeshift.app.paths import DEMO  # noqa: E402
 from shapeshift.decomposition.masks.anchor_walk import nodes_of  # noqa: E402
+from shapeshift.runtime_models.model import AnchorModel  # noqa: E402
 from shapeshift.runtime_models.read_scene import read_model  # noqa: E402
 from shapeshift.scene.cameras.camera_list import CameraReading  # noqa: E402
 from shapeshift.scene.colliders.collider import Collider  # noqa: E402
@@ -49,13 +50,14 @@ class Bench:
         self.opened = read_files([Path(DEMO)], lambda path, told: read_model(path),
                                  CameraReading(), None)  # fmt: skip
         model = opened_scene(self.opened)[0].objects[0].model
+        assert isinstance(model, AnchorModel)
         nodes = nodes_of(model, EYE)
         self.rows, self.count = nodes.rows, len(model.anchors)
         self.true = labels_of_places(nodes.means)[0]
 
     def cut(self, thing: str) -> tuple[EditorState, int, float]:
         """A state with the thing cut out and falling, its anchors, seconds of that."""
-        state = EditorState(lambda path: None)
+        state = EditorState(read_model)
         scene, edited = opened_scene(self.opened)
         state.open_sources(self.opened.sources, scene, None, edited)
         rows = np.zeros(self.count, bool)

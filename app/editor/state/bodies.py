@@ -204,9 +204,9 @@ class Bodies:
         return self._of_before(item) is not None or making_of(item) in self._made
 
     def _collider(self, item: SceneItem) -> "Collider | None":
-        """What was made for the object or for its like; None: it has none."""
+        """What was made for the object or for its like; None: it has none, or none yet."""
         before = self._of_before(item)
-        return self._made[making_of(item)] if before is None else before
+        return self._made.get(making_of(item)) if before is None else before
 
     def _of_before(self, item: SceneItem) -> "Collider | None":
         """What the object has had so far, where that still fits; x may have moved since."""

@@ -20,7 +20,7 @@ BAR_BELOW = 18.0  # between the bar and the status line
 LEGEND = 100.0  # width of the thermal legend with what lies at its right
 LEGEND_TALL = 348.0
 STRIP = 112.0  # height of the film's timeline over the whole lower edge
-ROOMY = (320.0, 380.0)  # beside the panel, and high: with less it is folded until it is asked for
+ROOMY = (280.0, 380.0)  # beside the panel, and high: with less it is folded until it is asked for
 LEAST_BESIDE_LEGEND = 180.0  # with less the legend is left out
 LEAST_FREE = 60.0  # with less of the window left the scene has all of it
 

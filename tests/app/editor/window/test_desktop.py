@@ -127,6 +127,7 @@ def test_fly_frame_reset_and_hide(viewer):
     press(viewer, glfw.KEY_V)
     run_frames(viewer, 60)
     np.testing.assert_allclose(viewer.viewpoint.view().eye_from_world(), first, atol=1e-6)
+    viewer.state.say("")  # what the keys said
     with_overlay = screenshot(viewer)
     press(viewer, glfw.KEY_H)
     run_frames(viewer, 60)

@@ -215,7 +215,7 @@ def test_two_stops_are_picked_by_clicks_and_slid_between(viewer, hands, only, mo
 
 def test_styles_have_a_row_of_their_own(viewer, only, monkeypatch):
     """A style between two photographed stops parts neither of them in the gallery."""
-    only("Gallery")
+    only(viewer, "Style", "Gallery")
     named = {"RGB": "rgb", "Melt": "style", "Thermal": "thermal", "Opened": "layer"}
     stops = tuple(Stop(name, x / 3, kind) for x, (name, kind) in enumerate(named.items()))
     monkeypatch.setattr(type(viewer.films.gallery), "stops", stops)
