@@ -13,10 +13,11 @@ from shapeshift.app.cluster.run_task import Here, TaskFailed
 from shapeshift.app.cluster.task import Task
 from shapeshift.app.command_line import parse
 from shapeshift.app.errors import UsageError
-from shapeshift.app.training.fit import Options, run, without_times
+from shapeshift.app.training.fit import Options, run
 from shapeshift.app.training.run_loop import INTERRUPTED
 from shapeshift.app.training.run_trials import Trials, calibrated_once
 from shapeshift.runtime_models.model import BadFile
+from shapeshift.runtime_models.package.read_package import read_package
 from shapeshift.scene.captures.read_capture import read_capture
 from shapeshift.training.checkpoint import checkpoint_path
 from shapeshift.training.fit.ablation import COMPONENTS
@@ -48,11 +49,11 @@ def options(balls: Path, out: Path, **more) -> Options:
         "device": "cpu",
         "asked": dict(SMALL),
     }
-    return Options(balls, out, json=out.with_suffix(".json"), **wished | more)
+    return Options(balls, out, **wished | more)
 
 
 def report(out: Path) -> object:
-    return without_times(json.loads(out.with_suffix(".json").read_text()))
+    return read_package(out).provenance["need"]
 
 
 class InThisProcess:

@@ -52,13 +52,13 @@ def asked(monkeypatch) -> list[str]:
     return found
 
 
-def decibels(path, capture, tmp_path, modality: str) -> float:
-    told_here = tmp_path / "eval.json"
-    assert evaluate(EvalOptions(path, capture, modality=modality, json=told_here)) == 0
-    return json.loads(told_here.read_text())["modalities"][modality]["psnr_db"]
+def decibels(path, capture, capsys, modality: str) -> float:
+    capsys.readouterr()
+    assert evaluate(EvalOptions(path, capture, modality=modality, json=True)) == 0
+    return json.loads(capsys.readouterr().out)["modalities"][modality]["psnr_db"]
 
 
-def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path):
+def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path, capsys):
     rows = []
     for folder, calibrate in zip(folders, (None, "Thermal"), strict=True):
         out = tmp_path / folder.name
@@ -74,11 +74,11 @@ def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path):
     np.testing.assert_allclose(rows[1], rows[0], atol=0.1)
     assert "--calibrate Thermal" in lines[0]
     assert table.run(options) == 0 and asked == ["Thermal"]  # it is kept
-    shown = decibels(out / "joint.shift", folders[1], tmp_path, "Thermal")
+    shown = decibels(out / "joint.shift", folders[1], capsys, "Thermal")
     assert shown == pytest.approx(rows[0][1], abs=0.1)
 
 
-def test_separate_models_keep_it(folders, asked, tmp_path):
+def test_separate_models_keep_it(folders, asked, tmp_path, capsys):
     options = TrainOptions(
         folders[1], tmp_path / "out", ASKED, separate=True, calibrate="Thermal", device="cpu"
     )
@@ -87,7 +87,7 @@ def test_separate_models_keep_it(folders, asked, tmp_path):
     rigs = [json.loads(rig_of(read_package(file).provenance)) for file in files]
     assert len(rigs) == 2
     np.testing.assert_allclose(rigs[1]["Thermal"], PLANTED.ravel(), atol=1e-8)
-    right, wrong = (decibels(files[1], folder, tmp_path, "Thermal") for folder in folders)
+    right, wrong = (decibels(files[1], folder, capsys, "Thermal") for folder in folders)
     assert wrong > right + 0.5  # its package moves both; only the wrong ones come right
 
 

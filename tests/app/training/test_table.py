@@ -124,22 +124,23 @@ def test_separate_models_are_single_stops_of_the_capture(compared, balls):
     assert splats.stops == balls.stops and np.bincount(splats.layer).max() <= 900
 
 
-def test_one_modality_is_evaluated_alone(compared, balls, tmp_path, capsys):
+def test_one_modality_is_evaluated_alone(compared, balls, capsys):
     options, lines = compared
     asked = EvalOptions(
-        options.out / "separate" / "1_Thermal.shift", balls.folder, "Thermal", tmp_path / "e.json"
+        options.out / "separate" / "1_Thermal.shift", balls.folder, "Thermal", json=True
     )
     assert evaluate(asked) == 0
-    found = json.loads((tmp_path / "e.json").read_text())["modalities"]
+    told = capsys.readouterr()
+    found = json.loads(told.out)["modalities"]
     wanted = rows_of(lines)["separate", "Thermal"]
-    assert list(found) == ["Thermal"] and "VGG" not in capsys.readouterr().err
+    assert list(found) == ["Thermal"] and "VGG" not in told.err
     assert found["Thermal"]["psnr_db"] == pytest.approx(float(wanted["psnr_db"]), abs=1e-3)
     with pytest.raises(BadFile, match="has no stop 'RGB'"):
         evaluate(replace(asked, modality=None))
     with pytest.raises(UsageError, match="no modality 'Xray'; it has RGB, Thermal"):
         evaluate(replace(asked, modality="Xray"))
     assert evaluate(replace(asked, vgg=options.vgg)) == 0
-    told = json.loads((tmp_path / "e.json").read_text())
+    told = json.loads(capsys.readouterr().out)
     assert told["modalities"]["Thermal"]["vgg_distance"] == float(wanted["vgg_distance"])
     assert told["vgg_file"].startswith("small.onnx, sha256 ")
 

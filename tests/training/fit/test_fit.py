@@ -75,11 +75,12 @@ def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkey
     )
     options = command.Options(
         captures["shared"].folder, tmp_path / "fit.shift", tolerance_db=5.0, seeds=2,
-        json=tmp_path / "fit.json", iterations=20,
+        json=True, iterations=20,
         asked={"max_anchors": 90, "splats_per_anchor": 2, "features": 4, "hidden": 8},
     )  # fmt: skip
     assert command.run(options) == 0
-    result = json.loads((tmp_path / "fit.json").read_text())
+    told = capsys.readouterr()
+    result = json.loads(told.out)
     model = read_package(tmp_path / "fit.shift")
     assert model.provenance["need"] == command.without_times(result)
     assert result["fitted"]["anchors"] == len(model.anchors)
@@ -88,7 +89,7 @@ def test_the_command_writes_a_package_with_its_report(captures, tmp_path, monkey
     row = result["parts"][0]
     assert (row["part"], row["verdict"]) == ("one splat of every anchor", "dropped")
     assert row["saves_bytes"] > 0 and row["change"]["RGB"]["error"] > 0
-    shown = capsys.readouterr().err
+    shown = told.err
     assert "one splat of every anchor" in shown and "Outlines of RGB and Thermal" in shown
 
 
