@@ -103,6 +103,7 @@ class Jobs:
 
     def throw(self) -> bool:
         state = self.viewer.state
+        self.person.strike("Escape")  # what a job before has left in the hand
         if self.viewer.parts.on:
             self.person.strike("o")
         self.person.key("t")
@@ -116,7 +117,7 @@ class Jobs:
         return bool(moved)
 
     def style(self) -> bool:
-        self._section("Gallery", "Add style")
+        self._section("Style", "Add style")
         self.person.press("Add style")
         begun = self.viewer.films.styles.running
         if begun:
@@ -127,7 +128,7 @@ class Jobs:
         self._section("Film", "Around")
         self.person.press("Around")
         self.person.press("Render")
-        begun = self.viewer.films.rendering.running
+        begun = self.person.until(lambda: self.viewer.films.rendering.running, 20)
         if begun:
             self._cancel()
         return begun
@@ -138,10 +139,8 @@ class Jobs:
         self.person.job.actions = counted
 
     def language(self) -> bool:
-        self._section("Settings", "##language")
-        self.person.press("##language")
-        x, y, _ = self.person.items.places["##language"]
-        self.person.click(x, y + 50, "click Deutsch")
+        self.person.press("globe")
+        self.person.press("de")
         return language_in_use().code == "de"
 
     def save(self) -> bool:

@@ -1,4 +1,9 @@
 // prefix: sums over a group of WORKGROUP invocations, all of which call both (Hillis and Steele).
+// Reads:   nothing.
+// Defines: uint sum_before(uint own): of the invocations before this one; uint prefix_total(): of
+//          all of them, after it.
+// Units:   none.
+
 shared uint prefix_sums[WORKGROUP];
 
 // What the invocations before this one have together.

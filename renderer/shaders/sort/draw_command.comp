@@ -17,7 +17,8 @@ void main() {
     // Keys less the nearest have fewer bits: depths within a factor of three or four have 24.
     bool known = key_bits == 32u && nearest <= farthest;
     uint base = known ? nearest : 0u, range = farthest - nearest, passes = key_bits / 8u;
-    if (known) passes = 1u + uint(range >> 8 > 0u) + uint(range >> 16 > 0u) + uint(range >> 24 > 0u);
+    if (known)
+        passes = 1u + uint(range >> 8 > 0u) + uint(range >> 16 > 0u) + uint(range >> 24 > 0u);
     const uint span = SORT_BLOCKS * WORKGROUP;  // keys a group
     for (uint later = 0u; later < MOST_LATER; later++) {
         uint groups = later + 1u < passes ? (sorted + span - 1u) / span : 0u;
