@@ -3,7 +3,8 @@
 // invocations hold it, and the bits below one's own are one's rank.
 // The order of the last pass is `order`, whatever the number of passes, so it and its spare take
 // turns from there backwards.
-// Reads:   keys, order or its spare, histogram; how many are sorted in counts, how often in dispatch.
+// Reads:   keys, order or its spare, histogram; how many are sorted in counts, and how often in
+//          dispatch.
 // Writes:  keys_out, the other of the two orders.
 // Units:   none.
 #include "common/prefix.glsl"
