@@ -49,12 +49,12 @@ class Making:
     """How colliders are made."""
 
     faces: int = FACES  # of the mesh, about
-    cells: int = CELLS  # along the longest side of splats, at most, that the mesh is made of
     most_parts: int = MOST_PARTS
     hollow: bool = False  # a place to be in: what it encloses stays free, and it is never cut
     kept: bool = True  # False: nothing is read from the user's cache or written to it
     rough: bool = False  # what was made before, else one hull, in a tenth of a second; never cut
     progress: Progress | None = None  # (what is being done, part done 0..1); may raise to end it
+    cells: int = CELLS  # along the longest side of splats, at most, that the mesh is made of
 
     def report(self, what: str, part: float) -> None:
         if self.progress:
