@@ -46,10 +46,13 @@ class Jobs:
 
     def _section(self, name: str, item: str) -> None:
         """Where an item is not in sight its section, or tool, is opened: that is an action."""
+        if not self._is_in_sight(item):
+            self.person.press(name)
+
+    def _is_in_sight(self, item: str) -> bool:
         items = self.person.items
         found = items.places.get(item)
-        if found is None or found[2] < items.newest - 1:
-            self.person.press(name)
+        return found is not None and found[2] >= items.newest - 1
 
     def _mug(self) -> tuple[float, float]:
         model = read_model(DEMO)
@@ -152,11 +155,15 @@ class Jobs:
         self.person.key("o", "Control_L")
         self.person.type(str(self.folder / "ball.ply"))
         self.person.key("Return")
-        return self.person.until(lambda: self.viewer.state.title == "ball")
+        self.person.rest()
+        if self._is_in_sight("Do not save"):  # the film's keys
+            self.person.press("Do not save")
+        return self.person.until(lambda: self.viewer.state.title == "ball", 60)
 
 
-JOBS = ("heat", "split", "mark", "length", "section", "cut_out", "throw", "style", "film",
-        "language", "save", "open")  # fmt: skip
+# A film is of what lies in files: it comes after what was cut out is saved.
+JOBS = ("heat", "split", "mark", "length", "section", "cut_out", "throw", "save", "style", "film",
+        "language", "open")  # fmt: skip
 
 
 def work(person: Person, folder: Path, names: list[str]) -> list[Job]:
