@@ -25,7 +25,8 @@ def overlap(one: tuple, other: tuple) -> bool:
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scale", SCALES)
 def test_no_part_covers_another_and_none_covers_what_is_free(size, scale):
-    for way in product([0, 1, 2], *[[False, True]] * 3, [None, True, False]):
+    no_or_yes = (False, True)
+    for way in product((0, 1, 2), no_or_yes, no_or_yes, no_or_yes, (None, True, False)):
         rows, legend, both, film, wanted = way
         rows = min(rows, 1) if size[1] / scale < 420 else rows  # as the viewer does
         layout = lay_out(size, scale, rows, legend, wanted, both=both, film=film)

@@ -30,8 +30,10 @@ def test_the_last_line_of_a_cell_is_a_picture_and_a_line(monkeypatch):
     scene = ss.Scene.from_model(paced_model(60))
     large = ss.Scene.from_model(paced_model(3000))
     for shown, splats in ((s._repr_html_(), s.splat_count) for s in (scene, large)):
-        png = re.search(r'^<img alt="The scene" src="data:image/png;base64,([^"]+)">', shown)[1]
-        picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(png))))
+        assert shown is not None
+        found = re.search(r'^<img alt="The scene" src="data:image/png;base64,([^"]+)">', shown)
+        assert found is not None
+        picture = np.asarray(Image.open(io.BytesIO(base64.b64decode(found[1]))))
         assert picture.shape == (360, 640, 3) and picture.std() > 5 and len(shown) < 1_000_000
         assert f"{splats:,} splats, stops" in shown and "<iframe" not in shown
 

@@ -188,6 +188,7 @@ def test_a_kill_amid_saving_is_no_work_of_somebody_else(tmp_path, monkeypatch, a
             assert recovering.work is None and not [*journal.folder.glob("*.journal")]
             assert again.messages.note.endswith("work.scene.json, work.marks.json.")
         else:
+            assert recovering.work is not None
             said = "\n".join(recovering.lines(recovering.work))
             assert "somebody else" not in said
             assert ("work.scene.json has it already, work.marks.json not yet" in said) == (

@@ -63,7 +63,7 @@ def test_a_grab_and_an_edit_come_back_in_the_headset_and_are_offered_at_the_desk
     assert kept and list(folder.iterdir()) == kept, "leaving is no refusal"
 
     opened = read_files([scene], lambda path, told: read_model(path), CameraReading(), None)
-    desk = EditorState(lambda path: None)
+    desk = EditorState(read_model)
     shown, edited = opened_scene(opened)
     desk.open_sources(opened.sources, shown, None, edited)
     work = left_work(desk, folder, [])

@@ -167,6 +167,7 @@ def test_they_stay_where_they_are_until_somebody_takes_them(things):
 def test_the_mug_is_hot_at_thermal_and_the_wrench_is_as_cold_as_the_room(things):
     """The tracer's mug has 52 to 57 °C and 71 of coffee, its wrench 20, of 15 to 95."""
     _, models, _ = things
+    assert STOPS[1].value_range is not None
     low, high = STOPS[1].value_range
     degrees = {}
     for name in ("mug", "wrench"):

@@ -59,7 +59,7 @@ def decibels(path, capture, capsys, modality: str) -> float:
 
 
 def test_a_table_of_wrong_poses_is_that_of_right_ones(folders, asked, tmp_path, capsys):
-    rows = []
+    rows, out = [], tmp_path
     for folder, calibrate in zip(folders, (None, "Thermal"), strict=True):
         out = tmp_path / folder.name
         options = table.Options(

@@ -9,6 +9,7 @@ from shapeshift.app.paths import DEMO
 from shapeshift.renderer.renderer import Renderer
 from shapeshift.renderer.settings import RenderSettings
 from shapeshift.runtime_models import session
+from shapeshift.runtime_models.model import AnchorModel
 from shapeshift.runtime_models.read_scene import read_model
 from shapeshift.scene.pose import Pose, View, look_at
 from shapeshift.scene.scene import Scene, SceneObject
@@ -42,6 +43,7 @@ def assert_alike(both, scene: Scene, views: list[View]) -> None:
 @pytest.mark.parametrize("x", [0.0, 0.3, 0.5, 0.75, 1.0])
 def test_the_bundled_scene_at_stops_and_between_them(both, x):
     model = read_model(DEMO)
+    assert isinstance(model, AnchorModel)
     centre = model.anchors.mean(axis=0)
     pose = look_at(centre + np.array([0.6, 0.5, 1.6]), centre)
     view = View(pose, (-0.5, 0.5, -0.3, 0.3), 0.05, 50, (256, 144))

@@ -306,6 +306,7 @@ def test_quick_cuts_cover_a_thing_and_no_more():
     far.apply_translation((0.5, 0, 0))
     for meshes, volume, fewest in ((bars, 0.007, 2), ([box], 0.002, 1), ([box, far], 0.004, 2)):
         both = trimesh.util.concatenate(meshes)
+        assert isinstance(both, trimesh.Trimesh)
         mesh = TriangleMesh(both.vertices.astype(np.float32), both.faces.astype(np.int32))
         parts = cut_quickly(mesh, 16)
         made = Collider(parts, mesh)

@@ -159,6 +159,7 @@ def test_heat_is_measured_from_the_panel_without_keys(picture, tmp_path, monkeyp
     press(wearer, "Undo")
     assert tool.file.isotherms == ()
     press(wearer, "above", "Save marks")
+    assert wearer.editor.edited.path is not None
     beside = marks_path(wearer.editor.edited.path)
     assert beside.is_relative_to(tmp_path) and len(read_marks_file(beside).isotherms) == 1
 
