@@ -51,7 +51,7 @@ def test_most_of_a_window_is_the_scenes():
 
 @pytest.mark.parametrize("legend", [False, True])
 def test_the_panel_folds_where_it_would_leave_too_little(legend):
-    least = 334 + LEGEND * legend + 320
+    least = 334 + LEGEND * legend + 280
     for width, height, folded in (
         (least, 380, False), (least - 1, 380, True), (least, 379, True), (5000, 379, True),
     ):  # fmt: skip

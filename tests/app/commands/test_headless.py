@@ -105,7 +105,7 @@ def test_a_scene_file_as_it_says(tmp_path, capsys):
     assert run("--scene", touch_film.SCENE, "--out", tmp_path, *QUICK) == 0
     names = {"view0.png", "view1.png", "view2.png", "sheet.png", "bench.json"}
     assert {path.name for path in tmp_path.iterdir()} == names
-    assert json.loads((tmp_path / "bench.json").read_text())["objects"] == 5
+    assert json.loads((tmp_path / "bench.json").read_text())["objects"] == 3
 
 
 def test_viewpoints_look_at_the_same_place_from_as_far(scene):
