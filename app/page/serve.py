@@ -265,11 +265,12 @@ def browse(view: "ViewOptions", why: str, browser: "BaseBrowser | None") -> int:
     kept = {*reading, *TAKEN_OVER, *OF_THE_WINDOW}
     left = [a.name for a in arguments_of(type(view)) if a.field.name not in kept
             and getattr(view, a.field.name) != a.field.default]  # fmt: skip
+    files = page_files(options)  # what cannot be shown is one sentence, before a page is promised
     server = server_on_free_port(options.port)
+    server.files = files
     say(f"{why} The page in a browser shows {options.scene.name} instead.")
     if left:
         say(f"It leaves out {', '.join(left)}, which the window has.")
-    server.files = page_files(options)
 
     def tell_where() -> None:
         if browser is not None and browser.open(server.address):

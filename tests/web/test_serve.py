@@ -231,6 +231,8 @@ def test_where_nobody_would_see_it_there_is_a_sentence(visit, tmp_path):
         assert (code, pages, firefox.opened) == (2, [], []) and "`x headless` needs none" in said
     picture = ["--screenshot", tmp_path / "a.png"]
     assert visit(picture, browser=firefox, terminal=True)[0] == 2
+    code, said, pages = visit(["--browser", "--memory", "1k"], browser=firefox)
+    assert (code, pages, said.count("\n")) == (2, [], 1) and "The page" not in said
     code, said, pages = visit([tmp_path / "a.shift", "--browser"], browser=firefox)
     assert (code, pages) == (2, []) and "The page shows one scene; name one of the 2." in said
 
